@@ -1,0 +1,171 @@
+"""What goes between the station and its planner process, as typed values and as JSON lines.
+
+JSON, not pickle: nothing that arrives here can run code.
+"""
+
+import json
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from base_station.hypotheses import Hypothesis
+from hil.faults import Fault, Type, Unit
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlanRequest:
+    """Learn a plan from where each twin stands now.
+
+    `states` is [H, V, S] (twin states, see `base_station.twin`), one row per hypothesis that has a
+    twin, vehicles in fleet order. For 'beta' H = 1: the verdict. `delivered` says per vehicle
+    whether its goal has been reached already ('beta').
+    """
+
+    number: int
+    kind: Literal["alpha", "beta"]
+    seed: int
+    preset: str
+    hypotheses: tuple[Hypothesis, ...]
+    posterior: tuple[float, ...]
+    states: Array
+    delivered: tuple[bool, ...]
+
+
+@dataclass(frozen=True)
+class PlanProgress:
+    """How a training is getting on; `attempt` counts restarts from 0."""
+
+    number: int
+    kind: Literal["alpha", "beta"]
+    attempt: int
+    timesteps: int
+    total_timesteps: int
+    mean_reward: float
+
+
+@dataclass(frozen=True)
+class OpenLoopPlan:
+    """Plan alpha: set-points [K, V, 3] (north m/s, east m/s, yaw rad; NaN yaw: not commanded).
+
+    Each row is held for `period_s`. `held` lists the vehicles (by index) that get no set-points
+    at all. `predicted_error` is the chance of confusing the worst pair of hypotheses, at the 10th
+    percentile of the twin's uncertain parameters. `predicted_reports` [H, K+1, V, 2] is what each
+    twin expects the station to receive (north, east).
+    """
+
+    setpoints: Array
+    period_s: float
+    held: tuple[int, ...]
+    predicted_error: float
+    predicted_reports: Array
+
+
+@dataclass(frozen=True)
+class PolicyWeights:
+    """A tanh MLP as plain arrays: what a closed-loop plan is. Layers are (weight [out, in], bias)."""
+
+    layers: tuple[tuple[Array, Array], ...]
+
+
+@dataclass(frozen=True)
+class Training:
+    """One training, accepted or rejected; `curve` rows are (timesteps, mean episode reward)."""
+
+    planner: str
+    preset: str
+    attempt: int
+    accepted: bool
+    timesteps: int
+    wall_s: float
+    curve: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class PlanReady:
+    """The answer to a PlanRequest. Both plans are None when every restart missed its target."""
+
+    number: int
+    kind: Literal["alpha", "beta"]
+    trainings: tuple[Training, ...]
+    plan: OpenLoopPlan | None = None
+    policy: PolicyWeights | None = None
+
+
+Message = PlanRequest | PlanProgress | PlanReady
+_TYPES = {t.__name__: t for t in (PlanRequest, PlanProgress, PlanReady)}
+
+
+def encode(message: Message) -> str:
+    """One JSON line, without the newline."""
+    return json.dumps({"type": type(message).__name__, **asdict(message)}, default=_plain)
+
+
+def decode(line: str) -> Message:
+    """The inverse of `encode`. Raises ValueError on anything else."""
+    tree = json.loads(line)
+    if not isinstance(tree, dict) or tree.get("type") not in _TYPES:
+        raise ValueError(f"not a planner message: {line[:80]}")
+    fields = {k: v for k, v in tree.items() if k != "type"}
+    if tree["type"] == "PlanRequest":
+        fields["hypotheses"] = tuple(_hypothesis(h) for h in fields["hypotheses"])
+        fields["posterior"] = tuple(fields["posterior"])
+        fields["states"] = _array(fields["states"])
+        fields["delivered"] = tuple(fields["delivered"])
+    elif tree["type"] == "PlanReady":
+        fields["trainings"] = tuple(_training(t) for t in fields["trainings"])
+        fields["plan"] = _plan(fields["plan"])
+        fields["policy"] = _policy(fields["policy"])
+    message: Message = _TYPES[tree["type"]](**fields)
+    return message
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"cannot be sent to the planner: {type(value).__name__}")
+
+
+def _array(rows: Any) -> Array:
+    return np.asarray(rows, dtype=np.float64)
+
+
+def _hypothesis(tree: dict[str, Any]) -> Hypothesis:
+    fault = tree["fault"]
+    return Hypothesis(
+        tree["name"],
+        tree["sysid"],
+        tree["prior"],
+        fault
+        and Fault(
+            Unit(fault["unit"]), Type(fault["type"]), tuple(fault["instances"]), tuple(fault["axes"])
+        ),
+    )
+
+
+def _training(tree: dict[str, Any]) -> Training:
+    curve = tuple((float(x), float(y)) for x, y in tree["curve"])
+    return Training(**{**tree, "curve": curve})
+
+
+def _plan(tree: dict[str, Any] | None) -> OpenLoopPlan | None:
+    if tree is None:
+        return None
+    return OpenLoopPlan(
+        _array(tree["setpoints"]),
+        tree["period_s"],
+        tuple(tree["held"]),
+        tree["predicted_error"],
+        _array(tree["predicted_reports"]),
+    )
+
+
+def _policy(tree: dict[str, Any] | None) -> PolicyWeights | None:
+    if tree is None:
+        return None
+    return PolicyWeights(tuple((_array(w), _array(b)) for w, b in tree["layers"]))

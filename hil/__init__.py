@@ -1,0 +1,1 @@
+"""What all processes share (scenario, airframe, faults, MAVLink values, links), and the bench."""

@@ -1,0 +1,1 @@
+"""A simulated vehicle: an autopilot with sensors, an estimator and MAVLink services."""
