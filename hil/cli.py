@@ -1,0 +1,138 @@
+"""The `hil` command. Heavy imports wait until a command needs them."""
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from hil.errors import HilError, InputError
+from hil.scenario import Scenario, load_scenario
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; errors meant for people are one line on stderr and an exit code."""
+    options = _parser().parse_args(argv)
+    try:
+        code = options.command(options)
+    except HilError as error:
+        print(f"hil: {error}", file=sys.stderr)
+        code = error.exit_code
+    assert isinstance(code, int)
+    return code
+
+
+def _world(options: argparse.Namespace) -> int:
+    from hil.world.process import WorldOptions, run_world
+
+    return run_world(
+        load_scenario(options.scenario, options.set),
+        WorldOptions(
+            speed=options.speed,
+            seed=options.seed,
+            physics_port=options.physics_port,
+            host=options.host,
+            truth=options.truth,
+            leash=options.leash,
+        ),
+    )
+
+
+def _run(options: argparse.Namespace) -> int:
+    from hil.bench.run import RunOptions, run
+
+    overrides = list(options.set)
+    if options.seed is not None:
+        overrides.append(f"seed={options.seed}")
+    return run(
+        load_scenario(options.scenario, overrides),
+        RunOptions(
+            out=options.out,
+            speed=options.speed,
+            in_memory=options.in_memory,
+            viewer=options.viewer,
+        ),
+    )
+
+
+def _check(options: argparse.Namespace) -> int:
+    from hil.bench.check import describe, refuse_hopeless
+
+    scenario = load_scenario(options.scenario, options.set)
+    print(describe(scenario))
+    refuse_hopeless(options.scenario, scenario)
+    return 0
+
+
+def _schema(_options: argparse.Namespace) -> int:
+    print(json.dumps(Scenario.model_json_schema(), indent=2))
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="hil", description="A testbed in which a fleet finds out for itself what is broken."
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    scenario = argparse.ArgumentParser(add_help=False)
+    scenario.add_argument("scenario", type=Path, metavar="SCENARIO", help="a YAML file")
+    scenario.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY.PATH=VALUE",
+        help="override one value of the scenario; may be given more than once",
+    )
+    timed = argparse.ArgumentParser(add_help=False)
+    timed.add_argument("--seed", type=int, help="instead of the scenario's")
+    timed.add_argument(
+        "--speed",
+        type=_speed,
+        default=1.0,
+        metavar="X",
+        help="times real time; 0 is as fast as possible",
+    )
+
+    world = commands.add_parser("world", parents=[scenario, timed], help="simulate the world")
+    world.add_argument("--physics-port", type=int, metavar="P", help="of the first vehicle")
+    world.add_argument("--host", help="address to listen on")
+    world.add_argument("--truth", metavar="FILE", help="where to write the truth; - is stdout")
+    world.add_argument(
+        "--leash",
+        action="store_true",
+        help="never step beyond the last `until SECONDS` read from stdin",
+    )
+    world.set_defaults(command=_world)
+
+    run = commands.add_parser("run", parents=[scenario, timed], help="run everything, and score")
+    run.add_argument("--out", type=Path, metavar="DIR", help="default runs/SCENARIO-TIMESTAMP")
+    run.add_argument(
+        "--in-memory", action="store_true", help="one process, in lockstep, deterministic"
+    )
+    run.add_argument(
+        "--viewer",
+        action=argparse.BooleanOptionalAction,
+        default=False,
+        help="open the Rerun viewer and stream to it",
+    )
+    run.set_defaults(command=_run)
+
+    check = commands.add_parser("check", parents=[scenario], help="validate a scenario")
+    check.set_defaults(command=_check)
+
+    schema = commands.add_parser("schema", help="print the JSON schema of scenarios")
+    schema.set_defaults(command=_schema)
+    return parser
+
+
+def _speed(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value) or value < 0.0:
+        raise argparse.ArgumentTypeError(f"{text}: must be finite and at least 0")
+    return value
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,168 @@
+"""The world process: sockets, pacing and signals around `Simulation`."""
+
+import os
+import select
+import signal
+import sys
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from types import FrameType
+from typing import TextIO
+
+from hil.errors import InputError, ProcessDiedError
+from hil.link import UdpLink
+from hil.scenario import Scenario
+from hil.world.pacing import Leash, Pace
+from hil.world.simulation import Advance, Simulation
+from hil.world.truth import contact_line, truth_line
+
+FIRST_FRAMES_WITHIN_S = 30.0
+DEFAULT_PORT = 9002
+_POLL_S = 0.1
+
+
+@dataclass(frozen=True)
+class WorldOptions:
+    """As on the command line. `truth` is a path, '-' for stdout, or None for nowhere."""
+
+    speed: float = 1.0
+    seed: int | None = None
+    physics_port: int | None = None
+    host: str | None = None
+    truth: str | None = None
+    leash: bool = False
+
+
+def run_world(scenario: Scenario, options: WorldOptions) -> int:
+    """Serve until SIGTERM or SIGINT. Raises InputError and ProcessDiedError."""
+    host = options.host or scenario.links.host
+    base = options.physics_port or scenario.links.physics_port_base or DEFAULT_PORT
+    ports = {v.sysid: base + 10 * i for i, v in enumerate(scenario.fleet)}
+    links = {sysid: _bind(host, port) for sysid, port in ports.items()}
+    seed = scenario.seed if options.seed is None else options.seed
+    names = {v.sysid: f"{v.name} (sysid {v.sysid}, port {ports[v.sysid]})" for v in scenario.fleet}
+    try:
+        with _open_truth(options.truth) as file:
+            leash = Leash(0.0) if options.leash else None
+            simulation, pace = Simulation(scenario, seed), Pace(options.speed)
+            _Server(simulation, links, names, partial(_write_truth, file), pace, leash).serve()
+    finally:
+        for link in links.values():
+            link.close()
+    return 0
+
+
+def _bind(host: str, port: int) -> UdpLink:
+    try:
+        return UdpLink.bind(host, port)
+    except OSError as error:
+        raise InputError(
+            f"physics port {host}:{port} cannot be bound: {error.strerror}; "
+            "choose another --physics-port, or stop who uses it"
+        ) from None
+
+
+def _open_truth(target: str | None) -> AbstractContextManager[TextIO | None]:
+    if target is None:
+        return nullcontext(None)
+    if target == "-":
+        return nullcontext(sys.stdout)
+    try:
+        return Path(target).open("w", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"--truth {target}: cannot be written: {error.strerror}") from None
+
+
+def _write_truth(file: TextIO | None, advance: Advance) -> None:
+    lines = [truth_line(t) for t in advance.truth] + [contact_line(c) for c in advance.contacts]
+    if file is not None and lines:
+        file.write("\n".join(lines) + "\n")
+        file.flush()
+
+
+@dataclass
+class _Server:
+    """The loop. With a leash the world belongs to `hil run`, and a silent vehicle ends it."""
+
+    simulation: Simulation
+    links: dict[int, UdpLink]
+    names: dict[int, str]
+    record: Callable[[Advance], None]
+    pace: Pace
+    leash: Leash | None = None
+    stopping: bool = False
+    started_s: float = field(default_factory=time.monotonic)
+
+    def serve(self) -> None:
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, self._stop)
+        print("ready", flush=True)
+        while not self.stopping:
+            self._receive()
+            now_s = time.monotonic()
+            self._check_presence(now_s)
+            wait_s = self._wait_s(now_s)
+            if wait_s > 0.0:
+                self._sleep(wait_s)
+                continue
+            advance = self.simulation.advance(self._until_s(), now_s)
+            for sysid, reply in advance.replies:
+                self.links[sysid].send(reply)
+            self.record(advance)
+        self.record(self.simulation.close())
+
+    def _stop(self, _number: int, _frame: FrameType | None) -> None:
+        self.stopping = True
+
+    def _until_s(self) -> float:
+        return self.leash.until_s if self.leash else float("inf")
+
+    def _receive(self) -> None:
+        now_s = time.monotonic()
+        for sysid, link in self.links.items():
+            for to, reply in self.simulation.receive(sysid, link.receive(), now_s):
+                self.links[to].send(reply)
+
+    def _wait_s(self, now_s: float) -> float:
+        step_s = 1.0 / self.simulation.world.physics_hz
+        on_leash = self.simulation.time_s + step_s > self._until_s() + 1e-6
+        if on_leash or not self.simulation.may_step():
+            return _POLL_S
+        return self.pace.wait_s(self.simulation.time_s, now_s)
+
+    def _sleep(self, wait_s: float) -> None:
+        """Until something arrives or the time is up."""
+        sources: list[UdpLink | int] = list(self.links.values())
+        if self.leash:
+            sources.append(0)
+        readable, _, _ = select.select(sources, [], [], min(wait_s, _POLL_S))
+        if self.leash and 0 in readable:
+            data = os.read(0, 65536)
+            self.leash.feed(data)
+            self.stopping = self.stopping or not data  # whoever held the leash is gone
+
+    def _check_presence(self, now_s: float) -> None:
+        absent = self.simulation.lockstep.absent()
+        if absent and now_s - self.started_s > FIRST_FRAMES_WITHIN_S:
+            raise ProcessDiedError(
+                f"no first frame from {self._named(absent)} within {FIRST_FRAMES_WITHIN_S:.0f} s; "
+                "start its sim-vehicle, or autopilot, with this physics port"
+            )
+        silent = self.simulation.lockstep.silent(now_s)
+        if silent and self.leash:
+            raise ProcessDiedError(f"{self._named(silent)} is silent for 2 s on the physics link")
+        for sysid in silent:
+            self.simulation.lockstep.lose(sysid)
+            print(
+                f"{self.names[sysid]} has been silent for 2 s; its body stays without power "
+                "until it comes back",
+                file=sys.stderr,
+                flush=True,
+            )
+
+    def _named(self, sysids: tuple[int, ...]) -> str:
+        return ", ".join(self.names[s] for s in sysids)

@@ -1,0 +1,82 @@
+"""Space and lockstep together: datagrams in, datagrams and truth out (pure; time is passed in)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from hil.physics_link import decode_frame, encode_state
+from hil.scenario import Scenario
+from hil.world.lockstep import Lockstep
+from hil.world.space import World
+from hil.world.truth import ContactEpisode, ContactLog, TruthRecord
+
+TRUTH_HZ = 10
+
+Reply = tuple[int, bytes]  # system id, datagram
+
+
+@dataclass(frozen=True)
+class Advance:
+    """What one advance brought: replies to send, truth to record, contacts that are over."""
+
+    replies: tuple[Reply, ...] = ()
+    truth: tuple[TruthRecord, ...] = ()
+    contacts: tuple[ContactEpisode, ...] = ()
+
+
+class Simulation:
+    """The world as its vehicles meet it. `now_s` is any monotonic wall time."""
+
+    def __init__(self, scenario: Scenario, seed: int) -> None:
+        self.world = World(scenario, seed)
+        self.lockstep = Lockstep(tuple(v.sysid for v in scenario.fleet), scenario.clock.physics_hz)
+        self._contact_log = ContactLog()
+        self._samples = 0  # truth records made so far
+
+    @property
+    def time_s(self) -> float:
+        return self.world.time_s
+
+    def receive(self, sysid: int, datagrams: Sequence[bytes], now_s: float) -> tuple[Reply, ...]:
+        """Take what a vehicle sent; returns cached replies that have to go out again."""
+        frames = (decode_frame(d) for d in datagrams)
+        again = [
+            self.lockstep.receive(sysid, frame, self.world.steps, now_s)
+            for frame in frames
+            if frame is not None
+        ]
+        return tuple((sysid, reply) for reply in again if reply is not None)
+
+    def may_step(self) -> bool:
+        """Every vehicle has joined and nobody owes a frame."""
+        return not self.lockstep.absent() and self.lockstep.may_step()
+
+    def advance(self, until_s: float, now_s: float) -> Advance:
+        """Step to the next answer, never beyond `until_s`. Call it when `may_step()`."""
+        truth = self._sample()
+        contacts: list[ContactEpisode] = []
+        target = self.lockstep.next_answer()
+        outputs = self.lockstep.outputs()
+        limit = until_s * self.world.physics_hz + 1e-6
+        while self.world.steps < target and self.world.steps + 1 <= limit:
+            self.world.step(outputs)
+            contacts += self._contact_log.add(self.time_s, self.world.contacts())
+            truth += self._sample()
+        return Advance(self._answer(now_s), truth, tuple(contacts))
+
+    def close(self) -> Advance:
+        """The last truth and the contacts still open."""
+        return Advance((), (self.world.truth(),), self._contact_log.close())
+
+    def _answer(self, now_s: float) -> tuple[Reply, ...]:
+        replies = []
+        for sysid in self.lockstep.answers_due(self.world.steps):
+            reply = encode_state(self.world.state(sysid))
+            self.lockstep.answered(sysid, reply, now_s)
+            replies.append((sysid, reply))
+        return tuple(replies)
+
+    def _sample(self) -> tuple[TruthRecord, ...]:
+        if self.world.steps * TRUTH_HZ < self._samples * self.world.physics_hz:
+            return ()
+        self._samples += 1
+        return (self.world.truth(),)

@@ -1,0 +1,126 @@
+"""The truth as the world tells it: where every body is, and which bodies touched (pure).
+
+Both go out as lines of JSON; times are world time (s), positions NED (m), impulses N s.
+"""
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+EPISODE_GAP_S = 0.25  # contacts of one pair closer in time than this are one episode
+
+
+@dataclass(frozen=True)
+class VehicleTruth:
+    """One body: position (m) and velocity (m/s) in NED, yaw in rad."""
+
+    north_m: float
+    east_m: float
+    yaw_rad: float
+    north_mps: float
+    east_mps: float
+
+
+@dataclass(frozen=True)
+class TruthRecord:
+    """All bodies at one instant, by system id."""
+
+    time_s: float
+    vehicles: dict[int, VehicleTruth]
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Two bodies that pressed on each other during one step, and the impulse that took."""
+
+    time_s: float
+    bodies: tuple[str, str]
+    impulse_ns: float
+
+
+@dataclass(frozen=True)
+class ContactEpisode:
+    """Contacts of one pair without a gap; `peak_impulse_ns` is the largest of any one step."""
+
+    start_s: float
+    end_s: float
+    bodies: tuple[str, str]
+    peak_impulse_ns: float
+
+    def extended(self, contact: Contact) -> "ContactEpisode":
+        return replace(
+            self,
+            end_s=contact.time_s,
+            peak_impulse_ns=max(self.peak_impulse_ns, contact.impulse_ns),
+        )
+
+
+class ContactLog:
+    """Merges contacts into episodes."""
+
+    def __init__(self) -> None:
+        self._open: dict[tuple[str, str], ContactEpisode] = {}
+
+    def add(self, time_s: float, contacts: Iterable[Contact]) -> tuple[ContactEpisode, ...]:
+        """Take the contacts of a step that ends at `time_s`; returns the episodes now over."""
+        for c in contacts:
+            begun = self._open.get(c.bodies)
+            first = ContactEpisode(c.time_s, c.time_s, c.bodies, c.impulse_ns)
+            self._open[c.bodies] = begun.extended(c) if begun else first
+        over = [e for e in self._open.values() if time_s - e.end_s > EPISODE_GAP_S]
+        for episode in over:
+            del self._open[episode.bodies]
+        return tuple(over)
+
+    def close(self) -> tuple[ContactEpisode, ...]:
+        """End all episodes, at the end of the world."""
+        episodes = tuple(self._open.values())
+        self._open.clear()
+        return episodes
+
+
+def truth_line(record: TruthRecord) -> str:
+    """A record as JSON; per vehicle north, east, yaw, north speed, east speed."""
+    vehicles = {
+        str(sysid): [round(x, 6) for x in (v.north_m, v.east_m, v.yaw_rad, v.north_mps, v.east_mps)]
+        for sysid, v in record.vehicles.items()
+    }
+    return _line({"type": "truth", "time_s": round(record.time_s, 6), "vehicles": vehicles})
+
+
+def contact_line(episode: ContactEpisode) -> str:
+    """An episode as JSON."""
+    return _line(
+        {
+            "type": "contact",
+            "time_s": round(episode.start_s, 6),
+            "end_s": round(episode.end_s, 6),
+            "bodies": list(episode.bodies),
+            "peak_impulse_ns": round(episode.peak_impulse_ns, 6),
+        }
+    )
+
+
+def parse_line(line: str) -> TruthRecord | ContactEpisode | None:
+    """The inverse of both; None for any other line."""
+    try:
+        tree = json.loads(line)
+        if tree["type"] == "truth":
+            vehicles = {int(s): VehicleTruth(*map(float, v)) for s, v in tree["vehicles"].items()}
+            return TruthRecord(float(tree["time_s"]), vehicles)
+        if tree["type"] == "contact":
+            first, second = tree["bodies"]
+            return ContactEpisode(
+                float(tree["time_s"]),
+                float(tree["end_s"]),
+                (str(first), str(second)),
+                float(tree["peak_impulse_ns"]),
+            )
+    except (ValueError, KeyError, TypeError, AttributeError):
+        pass
+    return None
+
+
+def _line(tree: dict[str, Any]) -> str:
+    return json.dumps(tree, separators=(",", ":"))
