@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from base_station.twin.compiled import compiled
+from base_station.twin.lump import INVERSE_INERTIA, INVERSE_MASS
 from base_station.twin.state import EAST, NORTH, V_EAST, V_NORTH, YAW_RATE
 
 ITERATIONS = 12  # enough for a push through a chain of three
+SETTLED_NS = 1e-7
 REACH_M = 0.1  # gaps that can close within a step; above 2 x the fastest vehicle x dt
 CELLS_ABOVE = 16  # below this many vehicles, looking at every pair is cheaper
 CORRECTION = 0.5  # share of a penetration removed per step
@@ -80,53 +82,69 @@ def add_pair(s: Any, radius: Any, i: int, j: int, contacts: Any, n: int) -> int:
         north, east, distance = 1.0, 0.0, 1.0
         square = 0.0
     gap = math.sqrt(square) - touch
-    row = contacts[n]
-    row[0], row[1], row[2], row[3], row[4] = i, j, north / distance, east / distance, gap
-    row[5] = row[6] = 0.0
-    return n + 1
+    return add_contact(contacts, n, i, j, north / distance, east / distance, gap)
 
 
 @compiled
 def add_wall(contacts: Any, n: int, i: int, north: float, east: float, gap: float) -> int:
     if gap >= REACH_M:
         return n
-    row = contacts[n]
-    row[0], row[1], row[2], row[3], row[4] = i, -1.0, north, east, gap
-    row[5] = row[6] = 0.0
+    return add_contact(contacts, n, i, -1, north, east, gap)
+
+
+@compiled
+def add_contact(
+    contacts: Any, n: int, i: int, j: int, north: float, east: float, gap: float
+) -> int:
+    contacts[n, 0], contacts[n, 1] = i, j
+    contacts[n, 2], contacts[n, 3], contacts[n, 4] = north, east, gap
+    contacts[n, 5] = contacts[n, 6] = 0.0
     return n + 1
 
 
 @compiled
 def solve_contacts(
-    s: Any, radius: Any, inverse: Any, friction: float, dt: float, contacts: Any
+    s: Any, radius: Any, k: Any, friction: float, dt: float, contacts: Any, n: int
 ) -> None:
-    """Change velocities so that no gap closes further than to touch. `inverse`: 1/mass, 1/inertia.
+    """Change velocities so that no gap closes further than to touch. `k` is the lumped array.
 
     Coulomb friction is bounded by the normal impulse so far.
     """
     for _ in range(ITERATIONS):
-        for k in range(contacts.shape[0]):
-            row = contacts[k]
-            i, j, nn, ne = int(row[0]), int(row[1]), row[2], row[3]
-            weight = inverse[i, 0] + (inverse[j, 0] if j >= 0 else 0.0)
-            closing = -relative(s, i, j, nn, ne) - max(row[4], 0.0) / dt
-            before = row[5]
-            row[5] = max(0.0, before + closing / weight)
-            push(s, inverse, i, j, nn, ne, row[5] - before)
-            if row[5] == 0.0 and row[6] == 0.0:
-                continue
-            ri, rj = radius[i], radius[j] if j >= 0 else 0.0
-            spin = s[i, YAW_RATE] * ri + (s[j, YAW_RATE] * rj if j >= 0 else 0.0)
-            slip = relative(s, i, j, -ne, nn) - spin
-            weight += ri * ri * inverse[i, 1] + (rj * rj * inverse[j, 1] if j >= 0 else 0.0)
-            before = row[6]
-            bound = friction * row[5]
-            row[6] = max(-bound, min(bound, before - slip / weight))
-            change = row[6] - before
-            push(s, inverse, i, j, -ne, nn, change)
-            s[i, YAW_RATE] -= ri * inverse[i, 1] * change
-            if j >= 0:
-                s[j, YAW_RATE] -= rj * inverse[j, 1] * change
+        largest = 0.0
+        for c in range(n):
+            i, j = int(contacts[c, 0]), int(contacts[c, 1])
+            nn, ne = contacts[c, 2], contacts[c, 3]
+            weight = k[i, INVERSE_MASS] + (k[j, INVERSE_MASS] if j >= 0 else 0.0)
+            closing = -relative(s, i, j, nn, ne) - max(contacts[c, 4], 0.0) / dt
+            before = contacts[c, 5]
+            contacts[c, 5] = max(0.0, before + closing / weight)
+            push(s, k, i, j, nn, ne, contacts[c, 5] - before)
+            if contacts[c, 5] > 0.0 or contacts[c, 6] != 0.0:
+                rub(s, radius, k, i, j, friction * contacts[c, 5], weight, contacts, c)
+            largest = max(largest, abs(contacts[c, 5] - before))
+        if largest < SETTLED_NS:
+            break
+
+
+@compiled
+def rub(
+    s: Any, radius: Any, k: Any, i: int, j: int, bound: float, weight: float, contacts: Any, c: int
+) -> None:
+    """The tangential part: against the slip of the rims, up to `bound` (N s)."""
+    nn, ne, ri = contacts[c, 2], contacts[c, 3], radius[i]
+    slip = relative(s, i, j, -ne, nn) - ri * s[i, YAW_RATE]
+    weight += ri * ri * k[i, INVERSE_INERTIA]
+    if j >= 0:
+        slip -= radius[j] * s[j, YAW_RATE]
+        weight += radius[j] * radius[j] * k[j, INVERSE_INERTIA]
+    before = contacts[c, 6]
+    contacts[c, 6] = max(-bound, min(bound, before - slip / weight))
+    change = contacts[c, 6] - before
+    push(s, k, i, j, -ne, nn, change)
+    s[i, YAW_RATE] -= ri * k[i, INVERSE_INERTIA] * change
+    if j >= 0:
+        s[j, YAW_RATE] -= radius[j] * k[j, INVERSE_INERTIA] * change
 
 
 @compiled
@@ -139,29 +157,29 @@ def relative(s: Any, i: int, j: int, north: float, east: float) -> float:
 
 
 @compiled
-def push(s: Any, inverse: Any, i: int, j: int, north: float, east: float, impulse: float) -> None:
-    s[i, V_NORTH] -= north * impulse * inverse[i, 0]
-    s[i, V_EAST] -= east * impulse * inverse[i, 0]
+def push(s: Any, k: Any, i: int, j: int, north: float, east: float, impulse: float) -> None:
+    s[i, V_NORTH] -= north * impulse * k[i, INVERSE_MASS]
+    s[i, V_EAST] -= east * impulse * k[i, INVERSE_MASS]
     if j >= 0:
-        s[j, V_NORTH] += north * impulse * inverse[j, 0]
-        s[j, V_EAST] += east * impulse * inverse[j, 0]
+        s[j, V_NORTH] += north * impulse * k[j, INVERSE_MASS]
+        s[j, V_EAST] += east * impulse * k[j, INVERSE_MASS]
 
 
 @compiled
-def correct_positions(s: Any, radius: Any, bounds: Any, inverse: Any, contacts: Any) -> None:
+def correct_positions(s: Any, radius: Any, bounds: Any, k: Any, contacts: Any, n: int) -> None:
     """Move overlapping discs apart, the lighter one further, and put all inside the walls."""
-    for k in range(contacts.shape[0]):
-        i, j = int(contacts[k, 0]), int(contacts[k, 1])
+    for c in range(n):
+        i, j = int(contacts[c, 0]), int(contacts[c, 1])
         if j < 0:
             continue
         north, east = s[j, NORTH] - s[i, NORTH], s[j, EAST] - s[i, EAST]
         overlap = radius[i] + radius[j] - math.sqrt(north * north + east * east)
         if overlap > 0.0:
-            move = CORRECTION * overlap / (inverse[i, 0] + inverse[j, 0])
-            s[i, NORTH] -= contacts[k, 2] * move * inverse[i, 0]
-            s[i, EAST] -= contacts[k, 3] * move * inverse[i, 0]
-            s[j, NORTH] += contacts[k, 2] * move * inverse[j, 0]
-            s[j, EAST] += contacts[k, 3] * move * inverse[j, 0]
+            move = CORRECTION * overlap / (k[i, INVERSE_MASS] + k[j, INVERSE_MASS])
+            s[i, NORTH] -= contacts[c, 2] * move * k[i, INVERSE_MASS]
+            s[i, EAST] -= contacts[c, 3] * move * k[i, INVERSE_MASS]
+            s[j, NORTH] += contacts[c, 2] * move * k[j, INVERSE_MASS]
+            s[j, EAST] += contacts[c, 3] * move * k[j, INVERSE_MASS]
     for i in range(s.shape[0]):
         r = radius[i]
         s[i, NORTH] = max(bounds[0] + r, min(bounds[1] - r, s[i, NORTH]))

@@ -10,6 +10,19 @@ import numpy as np
 
 from base_station.twin.compiled import compiled
 from base_station.twin.contact import correct_positions, find_contacts, solve_contacts
+from base_station.twin.lump import (
+    DAMP,
+    GIVE,
+    LOSS,
+    MIX,
+    PER_SPEED,
+    ROLLING,
+    SPEED_LIMIT,
+    STUCK,
+    YAW_LOSS,
+    columns,
+    lump,
+)
 from base_station.twin.state import (
     DRIVEN,
     EAST,
@@ -48,37 +61,36 @@ def advance_rows(
     """`steps` of dt for all rows of `states`, in place; adds to `impulses` and `walls`."""
     rows, count = states.shape[0], states.shape[1]
     draws, hypotheses = parameters.mass_kg.shape[0], faults.power.shape[0]
-    inverse = np.empty((count, 2))
+    dt, radius, bounds = vehicles.dt_s, vehicles.radius_m, vehicles.bounds_m
+    locked, motors = vehicles.yaw_locked, vehicles.arm_m.shape[1]
+    k = np.empty((count, columns(motors)))
     contacts = np.empty((min(count * (count - 1) // 2, 10 * count) + 4 * count, 7))
     for b in range(rows):
-        p, h, s = b * draws // rows, b % hypotheses, states[b]
-        for v in range(count):
-            inverse[v, 0] = 1.0 / parameters.mass_kg[p, v]
-            inverse[v, 1] = 0.0 if vehicles.yaw_locked else 1.0 / parameters.inertia_kgm2[p, v]
-        delay = round(parameters.latency_s[p] / vehicles.dt_s)
-        for k in range(steps):
-            if k == delay:
+        p, s = b * draws // rows, states[b]
+        lump(vehicles, parameters, faults, p, b % hypotheses, k)
+        delay = round(parameters.latency_s[p] / dt)
+        for step in range(steps):
+            if step == delay:
                 take_commands(s, setpoints[b], driven[b])
             for v in range(count):
-                drive(vehicles, parameters, faults, p, h, v, s[v])
-            n = find_contacts(s, vehicles.radius_m, vehicles.bounds_m, contacts)
+                drive(k, motors, locked, dt, v, s)
+            n = find_contacts(s, radius, bounds, contacts)
             if n > 0:
-                friction = parameters.friction[p]
-                solve_contacts(s, vehicles.radius_m, inverse, friction, vehicles.dt_s, contacts[:n])
-                note_contacts(contacts[:n], impulses[b], walls[b])
+                solve_contacts(s, radius, k, parameters.friction[p], dt, contacts, n)
+                note_contacts(contacts, n, impulses[b], walls[b])
             for v in range(count):
-                s[v, NORTH] += s[v, V_NORTH] * vehicles.dt_s
-                s[v, EAST] += s[v, V_EAST] * vehicles.dt_s
-                s[v, YAW] = wrapped(s[v, YAW] + s[v, YAW_RATE] * vehicles.dt_s)
+                s[v, NORTH] += s[v, V_NORTH] * dt
+                s[v, EAST] += s[v, V_EAST] * dt
+                s[v, YAW] = wrapped(s[v, YAW] + s[v, YAW_RATE] * dt)
             if n > 0:
-                correct_positions(s, vehicles.radius_m, vehicles.bounds_m, inverse, contacts[:n])
+                correct_positions(s, radius, bounds, k, contacts, n)
         if delay >= steps:  # a latency longer than the call is cut to it
             take_commands(s, setpoints[b], driven[b])
 
 
 @compiled
 def take_commands(s: Any, setpoints: Any, driven: Any) -> None:
-    """Put the set-points [V, 3] into effect; HOLD (not driven) forgets set-point and integrals."""
+    """Put set-points [V, 3] into effect; HOLD (not driven) forgets set-point and integrals."""
     for v in range(s.shape[0]):
         if driven[v]:
             s[v, DRIVEN] = 1.0
@@ -93,110 +105,80 @@ def take_commands(s: Any, setpoints: Any, driven: Any) -> None:
 
 
 @compiled
-def drive(vehicles: Any, parameters: Any, faults: Any, p: int, h: int, v: int, s: Any) -> None:
+def drive(k: Any, motors: int, locked: bool, dt: float, v: int, s: Any) -> None:
     """Velocities of one vehicle after a step of its autopilot, motors and rolling resistance."""
-    c, sn = math.cos(s[YAW]), math.sin(s[YAW])
-    vx = c * s[V_NORTH] + sn * s[V_EAST]
-    vy = c * s[V_EAST] - sn * s[V_NORTH]
-    mass, inertia, dt = parameters.mass_kg[p, v], parameters.inertia_kgm2[p, v], vehicles.dt_s
-    ax = ay = turn = 0.0
-    if s[DRIVEN] != 0.0:
-        ux, uy, uyaw = autopilot(vehicles, faults.gps_stuck[h, v], v, s, c, sn)
-        ax, ay, turn = motors(
-            vehicles, parameters.stall_force_n[p, v], faults.power[h, v], v,
-            (ux, uy, uyaw), (vx, vy, s[YAW_RATE]), (mass, inertia), dt,
-        )  # fmt: skip
+    north, east, rate = s[v, V_NORTH], s[v, V_EAST], s[v, YAW_RATE]
+    if s[v, DRIVEN] != 0.0:
+        c, sn = math.cos(s[v, YAW]), math.sin(s[v, YAW])
+        ux, uy, uyaw = autopilot(k, motors, locked, dt, v, s, c, sn)
+        vx, vy = c * north + sn * east, c * east - sn * north
+        ax = dot(k, v, GIVE, ux, uy, uyaw) - dot(k, v, DAMP, vx, vy, rate)
+        ay = dot(k, v, GIVE + 3, ux, uy, uyaw) - dot(k, v, DAMP + 3, vx, vy, rate)
+        north += (c * ax - sn * ay) * dt
+        east += (sn * ax + c * ay) * dt
+        rate += (dot(k, v, GIVE + 6, ux, uy, uyaw) - dot(k, v, DAMP + 6, vx, vy, rate)) * dt
     else:
-        s[SP_YAW] = s[YAW]
-    v_north = s[V_NORTH] + (c * ax - sn * ay) * dt
-    v_east = s[V_EAST] + (sn * ax + c * ay) * dt
-    keep = slowed(math.hypot(v_north, v_east), parameters.rolling_force_n[p, v] / mass * dt)
-    s[V_NORTH], s[V_EAST] = v_north * keep, v_east * keep
-    if vehicles.yaw_locked:
-        s[YAW_RATE] = 0.0
-    else:
-        rate = s[YAW_RATE] + turn * dt
-        s[YAW_RATE] = rate * slowed(abs(rate), parameters.yaw_resistance_nm[p, v] / inertia * dt)
+        s[v, SP_YAW] = s[v, YAW]
+    keep = kept(math.sqrt(north * north + east * east), k[v, LOSS])
+    s[v, V_NORTH], s[v, V_EAST] = north * keep, east * keep
+    s[v, YAW_RATE] = 0.0 if locked else rate * kept(abs(rate), k[v, YAW_LOSS])
 
 
 @compiled
-def autopilot(vehicles: Any, stuck: Any, v: int, s: Any, c: float, sn: float) -> Any:
-    """Body commands x, y, yaw of the velocity loop; a stuck axis reports no velocity."""
-    speed = math.hypot(s[SP_NORTH], s[SP_EAST])
-    scale = min(1.0, vehicles.speed_limit_mps[v] / speed) if speed > 0.0 else 1.0
-    sp_north, sp_east = s[SP_NORTH] * scale, s[SP_EAST] * scale
-    seen_north = 0.0 if stuck[0] else s[V_NORTH]
-    seen_east = 0.0 if stuck[1] else s[V_EAST]
-    error_n, error_e = sp_north - seen_north, sp_east - seen_east
-    gain = INTEGRATOR_GAIN * vehicles.dt_s
-    s[I_X] = clipped(s[I_X] + gain * (c * error_n + sn * error_e), INTEGRATOR_LIMIT)
-    s[I_Y] = clipped(s[I_Y] + gain * (c * error_e - sn * error_n), INTEGRATOR_LIMIT)
-    ux = feed_forward(vehicles, v, 0, c * sp_north + sn * sp_east) + s[I_X]
-    uy = feed_forward(vehicles, v, 1, c * sp_east - sn * sp_north) + s[I_Y]
-    turn = YAW_GAIN * wrapped(s[SP_YAW] - s[YAW]) - YAW_RATE_GAIN * s[YAW_RATE]
-    return ux, uy, 0.0 if vehicles.yaw_locked else clipped(turn, YAW_LIMIT)
+def autopilot(
+    k: Any, motors: int, locked: bool, dt: float, v: int, s: Any, c: float, sn: float
+) -> Any:
+    """Body commands x, y, yaw of the velocity loop; a stuck axis reports no velocity.
+
+    Scaled down together when a motor would saturate.
+    """
+    sp_north, sp_east = s[v, SP_NORTH], s[v, SP_EAST]
+    speed = math.sqrt(sp_north * sp_north + sp_east * sp_east)
+    if speed > k[v, SPEED_LIMIT]:
+        sp_north *= k[v, SPEED_LIMIT] / speed
+        sp_east *= k[v, SPEED_LIMIT] / speed
+    error_n = sp_north if k[v, STUCK] != 0.0 else sp_north - s[v, V_NORTH]
+    error_e = sp_east if k[v, STUCK + 1] != 0.0 else sp_east - s[v, V_EAST]
+    gain = INTEGRATOR_GAIN * dt
+    s[v, I_X] = clipped(s[v, I_X] + gain * (c * error_n + sn * error_e), INTEGRATOR_LIMIT)
+    s[v, I_Y] = clipped(s[v, I_Y] + gain * (c * error_e - sn * error_n), INTEGRATOR_LIMIT)
+    ux = feed_forward(k, v, 0, c * sp_north + sn * sp_east) + s[v, I_X]
+    uy = feed_forward(k, v, 1, c * sp_east - sn * sp_north) + s[v, I_Y]
+    uyaw = 0.0
+    if not locked:
+        turn = YAW_GAIN * wrapped(s[v, SP_YAW] - s[v, YAW]) - YAW_RATE_GAIN * s[v, YAW_RATE]
+        uyaw = clipped(turn, YAW_LIMIT)
+    largest = 1.0
+    for m in range(motors):
+        largest = max(largest, abs(dot(k, v, MIX + 3 * m, ux, uy, uyaw)))
+    return ux / largest, uy / largest, uyaw / largest
 
 
 @compiled
-def feed_forward(vehicles: Any, v: int, axis: int, setpoint_mps: float) -> float:
+def feed_forward(k: Any, v: int, axis: int, setpoint_mps: float) -> float:
     """Output that should hold the set-point: the motors' speed line plus rolling resistance."""
-    u: float = setpoint_mps / vehicles.axis_free_speed_mps[v, axis]
+    u: float = setpoint_mps * k[v, PER_SPEED + axis]
     if abs(setpoint_mps) >= STANDSTILL_MPS:
-        u += math.copysign(vehicles.axis_rolling[v, axis], setpoint_mps)
+        u += math.copysign(k[v, ROLLING + axis], setpoint_mps)
     return u
 
 
 @compiled
-def motors(
-    vehicles: Any, stall: Any, power: Any, v: int, u: Any, velocity: Any, inertia: Any, dt: float
-) -> Any:
-    """Accelerations (body x, y, yaw) that all motors give together.
-
-    Trapezoidal in the motors' own damping, so that steps of 0.02 s agree with finer ones.
-    """
-    direction, arm, free = vehicles.direction[v], vehicles.arm_m[v], vehicles.free_speed_mps[v]
-    count = arm.shape[0]
-    scale = 1.0
-    for m in range(count):
-        scale = max(scale, abs(mixed(direction[m], arm[m], u)))
-    fx = fy = torque = damp_x = damp_y = damp_yaw = 0.0
-    for m in range(count):
-        if power[m] == 0.0:
-            continue
-        dx, dy = direction[m, 0], direction[m, 1]
-        wheel = dx * velocity[0] + dy * velocity[1] + arm[m] * velocity[2]
-        force = stall[m] * (mixed(direction[m], arm[m], u) / scale - wheel / free[m])
-        fx += force * dx
-        fy += force * dy
-        torque += force * arm[m]
-        damp_x += stall[m] / free[m] * dx * dx
-        damp_y += stall[m] / free[m] * dy * dy
-        damp_yaw += stall[m] / free[m] * arm[m] * arm[m]
-    mass, yaw_inertia = inertia
-    return (
-        fx / (mass + 0.5 * dt * damp_x),
-        fy / (mass + 0.5 * dt * damp_y),
-        torque / (yaw_inertia + 0.5 * dt * damp_yaw),
-    )
+def dot(k: Any, v: int, column: int, x: float, y: float, z: float) -> float:
+    result: float = k[v, column] * x + k[v, column + 1] * y + k[v, column + 2] * z
+    return result
 
 
 @compiled
-def mixed(direction: Any, arm: float, u: Any) -> float:
-    turn = u[2] * (1.0 if arm > 0.0 else -1.0 if arm < 0.0 else 0.0)
-    output: float = direction[0] * u[0] + direction[1] * u[1] + turn
-    return output
+def kept(speed: float, loss: float) -> float:
+    """The factor that Coulomb resistance leaves of a speed; it never reverses it."""
+    return (speed - loss) / speed if speed > loss else 0.0
 
 
 @compiled
-def slowed(speed: float, loss: float) -> float:
-    """The factor Coulomb resistance leaves of a speed; it never reverses it."""
-    return max(0.0, speed - loss) / speed if speed > 0.0 else 0.0
-
-
-@compiled
-def note_contacts(contacts: Any, impulses: Any, walls: Any) -> None:
+def note_contacts(contacts: Any, n: int, impulses: Any, walls: Any) -> None:
     """Add normal impulses (N s) to [V, V] if it is wanted (not empty), and mark walls [V]."""
-    for k in range(contacts.shape[0]):
+    for k in range(n):
         if contacts[k, 5] > 0.0:
             i, j = int(contacts[k, 0]), int(contacts[k, 1])
             if j < 0:
