@@ -6,6 +6,7 @@ import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from hil.errors import HilError, InputError
 from hil.scenario import Scenario, load_scenario
@@ -13,8 +14,8 @@ from hil.scenario import Scenario, load_scenario
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; errors meant for people are one line on stderr and an exit code."""
-    options = _parser().parse_args(argv)
     try:
+        options = _parser().parse_args(argv)
         code = options.command(options)
     except HilError as error:
         print(f"hil: {error}", file=sys.stderr)
@@ -27,10 +28,9 @@ def _world(options: argparse.Namespace) -> int:
     from hil.world.process import WorldOptions, run_world
 
     return run_world(
-        load_scenario(options.scenario, options.set),
+        _seeded_scenario(options),
         WorldOptions(
             speed=options.speed,
-            seed=options.seed,
             physics_port=options.physics_port,
             host=options.host,
             truth=options.truth,
@@ -42,11 +42,8 @@ def _world(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace) -> int:
     from hil.bench.run import RunOptions, run
 
-    overrides = list(options.set)
-    if options.seed is not None:
-        overrides.append(f"seed={options.seed}")
     return run(
-        load_scenario(options.scenario, overrides),
+        _seeded_scenario(options),
         RunOptions(
             out=options.out,
             speed=options.speed,
@@ -70,8 +67,20 @@ def _schema(_options: argparse.Namespace) -> int:
     return 0
 
 
+def _seeded_scenario(options: argparse.Namespace) -> Scenario:
+    seed = [] if options.seed is None else [f"seed={options.seed}"]
+    return load_scenario(options.scenario, [*options.set, *seed])
+
+
+class _Parser(argparse.ArgumentParser):
+    """Reports bad options as all other bad input: one line, exit code 2."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message}; see `{self.prog} --help`")
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="hil", description="A testbed in which a fleet finds out for itself what is broken."
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
@@ -128,7 +137,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _speed(text: str) -> float:
-    value = float(text)
+    value = float(text)  # argparse words the ValueError
     if not math.isfinite(value) or value < 0.0:
         raise argparse.ArgumentTypeError(f"{text}: must be finite and at least 0")
     return value

@@ -30,7 +30,6 @@ class WorldOptions:
     """As on the command line. `truth` is a path, '-' for stdout, or None for nowhere."""
 
     speed: float = 1.0
-    seed: int | None = None
     physics_port: int | None = None
     host: str | None = None
     truth: str | None = None
@@ -43,12 +42,11 @@ def run_world(scenario: Scenario, options: WorldOptions) -> int:
     base = options.physics_port or scenario.links.physics_port_base or DEFAULT_PORT
     ports = {v.sysid: base + 10 * i for i, v in enumerate(scenario.fleet)}
     links = {sysid: _bind(host, port) for sysid, port in ports.items()}
-    seed = scenario.seed if options.seed is None else options.seed
     names = {v.sysid: f"{v.name} (sysid {v.sysid}, port {ports[v.sysid]})" for v in scenario.fleet}
     try:
         with _open_truth(options.truth) as file:
             leash = Leash(0.0) if options.leash else None
-            simulation, pace = Simulation(scenario, seed), Pace(options.speed)
+            simulation, pace = Simulation(scenario, scenario.seed), Pace(options.speed)
             _Server(simulation, links, names, partial(_write_truth, file), pace, leash).serve()
     finally:
         for link in links.values():
