@@ -1,1 +1,1 @@
-"""A base station that doubts, experiments, decides and replans. It sees only what a ground station sees."""
+"""A base station that doubts, experiments, decides and replans: it sees only MAVLink."""

@@ -42,7 +42,8 @@ def candidates(member: FleetMember, priors: Priors) -> tuple[Hypothesis, ...]:
         if member.frame.axis_motors(axis)
     ]
     gps = [
-        (f"gps_{axis}_stuck", Fault(Unit.GPS, Type.STUCK, axes=(axis,))) for axis in ("north", "east")
+        (f"gps_{axis}_stuck", Fault(Unit.GPS, Type.STUCK, axes=(axis,)))
+        for axis in ("north", "east")
     ]
     weighted: list[tuple[str, Fault | None, float]] = [
         *((name, fault, priors.motor / len(motors)) for name, fault in motors),

@@ -74,7 +74,7 @@ class UdpLink:
             pass  # UDP: a full buffer or an absent peer loses the datagram, as on the air
 
     def receive(self) -> list[bytes]:
-        datagrams = []
+        datagrams: list[bytes] = []
         while True:
             try:
                 data, sender = self._socket.recvfrom(65535)

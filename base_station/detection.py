@@ -1,0 +1,65 @@
+"""Is something wrong? A residual test per vehicle and axis against the twin that is believed.
+
+Two one-sided CUSUMs (Page 1954) on the normalised innovation. For white unit noise the mean time
+between false alarms of one side follows Siegmund's approximation (1985, eq. 2.57); the threshold
+is solved from the false-alarm rate asked for, shared out over all sides.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+DRIFT = 1.0  # sigma per sample; half of the smallest shift that is worth an alarm (2 sigma)
+
+
+@dataclass(frozen=True)
+class Cusum:
+    """`statistic` is [V, 2 axes, 2 signs]; `quiet_since_s` [V] when a vehicle's were last all 0."""
+
+    statistic: Array
+    quiet_since_s: Array
+
+    @property
+    def level(self) -> Array:
+        """[V, 2]: the larger of both sides."""
+        return np.asarray(self.statistic.max(axis=2))
+
+
+def start(vehicles: int, time_s: float) -> Cusum:
+    return Cusum(np.zeros((vehicles, 2, 2)), np.full(vehicles, time_s))
+
+
+def update(cusum: Cusum, residual: Array, time_s: float) -> Cusum:
+    """One more normalised innovation [V, 2]; NaN rows (nothing received) leave their state."""
+    z = np.nan_to_num(residual)
+    known = ~np.isnan(residual)
+    steps = np.stack([z - DRIFT, -z - DRIFT], axis=2)
+    statistic = np.where(
+        known[:, :, None], np.maximum(0.0, cusum.statistic + steps), cusum.statistic
+    )
+    quiet = statistic.reshape(len(statistic), -1).max(axis=1) == 0.0
+    return Cusum(statistic, np.where(quiet, time_s, cusum.quiet_since_s))
+
+
+def mean_time_to_false_alarm(threshold: float) -> float:
+    """Samples between false alarms of one side, white unit noise (Siegmund 1985)."""
+    b = threshold + 1.166
+    return (math.exp(2 * DRIFT * b) - 2 * DRIFT * b - 1) / (2 * DRIFT**2)
+
+
+def threshold(false_alarms_per_hour: float, sample_hz: float, vehicles: int) -> float:
+    """The CUSUM level whose alarms, of all vehicles, axes and signs together, are this rare."""
+    sides = vehicles * 2 * 2
+    wanted = sides * sample_hz * 3600.0 / false_alarms_per_hour
+    low, high = 0.0, 50.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        if mean_time_to_false_alarm(middle) < wanted:
+            low = middle
+        else:
+            high = middle
+    return high

@@ -1,0 +1,80 @@
+"""The receiving side: messages of all vehicles to tracks, on one clock, cut into ticks."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from base_station.fleet_clock import FleetClock
+from base_station.telemetry import Frame, Sample, Track, frame_at, note
+from hil import mavlink
+from hil.scenario import StationView
+
+WAIT_FOR_LATE_S = 0.3  # fleet time; then a tick goes on without the vehicle that is late
+LINK_LOST_WALL_S = 5.0
+
+
+class Fleet:
+    """Tracks in fleet order. Only messages from the vehicle that belongs on a link count."""
+
+    def __init__(self, view: StationView) -> None:
+        self.view = view
+        self.tracks = [Track() for _ in view.fleet]
+        self._clock = FleetClock(tuple(m.sysid for m in view.fleet))
+        self._next_tick = 0  # in ticks of 1 / telemetry_hz of fleet time
+
+    @property
+    def period_s(self) -> float:
+        return 1.0 / self.view.clock.telemetry_hz
+
+    def receive(self, index: int, message: mavlink.Received, wall_s: float) -> None:
+        """Take in one message that arrived on vehicle `index`'s link."""
+        member, track = self.view.fleet[index], self.tracks[index]
+        if message.sysid != member.sysid or message.compid != mavlink.COMPONENT_AUTOPILOT:
+            return
+        track.last_heard_wall_s = wall_s
+        value = message.value
+        track.status = note(track.status, value, len(member.frame.motors))
+        if isinstance(value, mavlink.LocalPosition):
+            time_s = self._clock.fleet_time_s(member.sysid, value.time_s)
+            north, east, _ = value.position_m
+            v_north, v_east, _ = value.velocity_mps
+            track.position(Sample(time_s, (north, east), (v_north, v_east)))
+        elif isinstance(value, mavlink.Timesync) and value.tc1_ns:
+            self._clock.reply(member.sysid, value.tc1_ns, value.ts1_ns, int(wall_s * 1e9))
+
+    def mode_acknowledged(self, index: int, mode: int) -> None:
+        """The vehicle said that it is in `mode` now, before its next heartbeat does."""
+        track = self.tracks[index]
+        track.status = replace(track.status, mode=mode)
+
+    @property
+    def newest_s(self) -> float:
+        return max(t.newest_s() for t in self.tracks)
+
+    @property
+    def complete(self) -> bool:
+        """All vehicles heard, located, and ready to arm."""
+        return all(t.status.heard and t.status.ready and t.samples for t in self.tracks)
+
+    def start_ticks(self) -> None:
+        """Begin with the first whole tick from now on."""
+        self._next_tick = int(self.newest_s / self.period_s) + 1
+
+    def due(self) -> list[Frame]:
+        """The frames whose time has come: all vehicles in, or the late ones waited for."""
+        frames = []
+        while self._is_due(self._next_tick * self.period_s):
+            frames.append(frame_at(self.tracks, self._next_tick * self.period_s))
+            self._next_tick += 1
+        return frames
+
+    def _is_due(self, time_s: float) -> bool:
+        times = [t.newest_s() for t in self.tracks]
+        return min(times) >= time_s - 1e-3 or max(times) >= time_s + WAIT_FOR_LATE_S
+
+    def silent(self, wall_s: float) -> Sequence[int]:
+        """Vehicles not heard of for LINK_LOST_WALL_S."""
+        return [
+            i
+            for i, t in enumerate(self.tracks)
+            if t.status.heard and wall_s - t.last_heard_wall_s > LINK_LOST_WALL_S
+        ]

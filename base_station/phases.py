@@ -1,0 +1,117 @@
+"""The phases of a mission, each with just what it needs to know of itself."""
+
+from dataclasses import dataclass
+
+from base_station.execution import Orders
+from base_station.planning.requests import OpenLoopPlan, PolicyWeights
+from base_station.records import Phase
+
+
+@dataclass(frozen=True)
+class Connecting:
+    name: Phase = "connect"
+
+
+@dataclass(frozen=True)
+class Arming:
+    name: Phase = "arm"
+
+
+@dataclass(frozen=True)
+class Probing:
+    """[0a]"""
+
+    since_s: float
+    name: Phase = "probe"
+
+
+@dataclass(frozen=True)
+class Settling:
+    """All in HOLD until the fleet is at rest; then [0b], the doubt about `suspect` is opened."""
+
+    since_s: float
+    suspect: int
+    healthy_until_s: float
+    name: Phase = "probe"
+
+
+@dataclass(frozen=True)
+class PlanningAlpha:
+    """[1] The planner is at work on request `number`; the fleet holds."""
+
+    number: int
+    name: Phase = "plan_alpha"
+
+
+@dataclass(frozen=True, eq=False)
+class Experimenting:
+    """[2]"""
+
+    plan: OpenLoopPlan
+    since_s: float
+    name: Phase = "experiment"
+
+
+@dataclass(frozen=True)
+class Concluding:
+    """The experiment is over: HOLD, and go on judging until the fleet has come to rest."""
+
+    since_s: float
+    name: Phase = "experiment"
+
+
+@dataclass(frozen=True)
+class PlanningBeta:
+    """[3]"""
+
+    number: int
+    name: Phase = "plan_beta"
+
+
+@dataclass(frozen=True, eq=False)
+class OnMission:
+    """[4] `orders` stand until the next control period."""
+
+    policy: PolicyWeights
+    since_s: float
+    orders: Orders
+    next_control_s: float
+    name: Phase = "mission"
+
+
+@dataclass(frozen=True)
+class Returning:
+    """Everything is delivered; rovers that left their goals to help go back. `still_since_s`."""
+
+    since_s: float
+    still_since_s: float | None = None
+    name: Phase = "return"
+
+
+@dataclass(frozen=True)
+class Holding:
+    """Stopped for good, for a reason that the result states."""
+
+    reason: str
+    name: Phase = "hold"
+
+
+@dataclass(frozen=True)
+class Finished:
+    name: Phase = "done"
+
+
+AnyPhase = (
+    Connecting
+    | Arming
+    | Probing
+    | Settling
+    | PlanningAlpha
+    | Experimenting
+    | Concluding
+    | PlanningBeta
+    | OnMission
+    | Returning
+    | Holding
+    | Finished
+)

@@ -1,0 +1,136 @@
+"""`base-station STATION_VIEW`: the thin shell with the sockets, the clocks and the files."""
+
+import argparse
+import json
+import os
+import select
+import signal
+import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+from base_station import twin
+from base_station.execution import hold
+from base_station.listeners import EventLog, Lines, TelemetryLogs
+from base_station.node import StationNode
+from base_station.planner_child import PlannerChild
+from base_station.recorder import Recorder
+from base_station.telemetry import Frame
+from base_station.watch import Baseline, Watch
+from hil.errors import HilError, InputError
+from hil.link import UdpLink
+from hil.scenario import StationView, load_station_view
+
+STEP_S = 0.05  # 20 Hz when nothing arrives
+
+
+class StopRequested(Exception):  # noqa: N818 - not an error
+    """SIGTERM or SIGINT: stop tidily."""
+
+
+def main() -> None:
+    arguments = _arguments()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, _terminate)
+    try:
+        run(arguments)
+    except StopRequested:
+        sys.exit(0)
+    except HilError as error:
+        print(f"base-station: {error}", file=sys.stderr)
+        sys.exit(error.exit_code)
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="base-station",
+        description="Find out what is broken in a fleet, over MAVLink, and finish its mission.",
+    )
+    parser.add_argument("view", type=Path, help="station view, as `hil view-of SCENARIO` writes it")
+    parser.add_argument("--out", type=Path, default=Path("."), help="where logs are written")
+    parser.add_argument("--machine", action="store_true", help="JSON lines instead of text")
+    parser.add_argument(
+        "--viewer", action="store_true", help="stream to a Rerun viewer, if one runs"
+    )
+    parser.add_argument("--run-id", default=None, help="recording id, to share one recording")
+    return parser.parse_args()
+
+
+def _terminate(_signal: int, _frame: FrameType | None) -> None:
+    raise StopRequested
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Raises InputError for a bad view or a busy port, ProcessDiedError when the planner dies."""
+    view = load_station_view(arguments.view)
+    say = _say_json if arguments.machine else _say_text
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    run_id = arguments.run_id or f"station-{os.getpid()}"
+    with ExitStack() as stack:
+        links = [_bind(view, member.mavlink_port) for member in view.fleet]
+        for link in links:
+            stack.callback(link.close)
+        planner = PlannerChild(arguments.view, arguments.out / "planner.log")
+        stack.callback(planner.close)
+        logs = TelemetryLogs(arguments.out, view)
+        stack.callback(logs.close)
+        events = EventLog(arguments.out / "events.jsonl")
+        stack.callback(events.close)
+        recorder = Recorder(arguments.out / "station.rrd", run_id, view, viewer=arguments.viewer)
+        stack.callback(recorder.close)
+        _compile_twin(view)
+        node = StationNode(view, links, planner, [logs, events, recorder, Lines(say)])
+        say({"type": "ready", "planner_pid": planner.pid})
+        while not node.finished:
+            select.select([*(link.fileno() for link in links), planner.fileno()], [], [], STEP_S)
+            node.step(time.monotonic(), time.time_ns() // 1000)
+
+
+def _bind(view: StationView, port: int) -> UdpLink:
+    try:
+        return UdpLink.bind(view.host, port)
+    except OSError as error:
+        raise InputError(
+            f"port {view.host}:{port} (mavlink_port): {error.strerror}; "
+            "free it or choose another mavlink_port"
+        ) from None
+
+
+def _compile_twin(view: StationView) -> None:
+    """The first call compiles the kernel, which takes seconds; later no step may."""
+    goals = [[m.goal.north_m, m.goal.east_m] for m in view.fleet]
+    state = twin.initial_state(goals, [0.0] * len(goals))
+    watch = Watch(view, Baseline(twin.FleetModel.from_view(view)), state, 0.0)
+    watch.tick(
+        Frame(0.0, state[:, :2], state[:, 3:5], state[:, 2], np.ones(len(goals), dtype=np.bool_)),
+        hold(len(goals)),
+    )
+
+
+def _say_json(line: dict[str, Any]) -> None:
+    print(json.dumps(line), flush=True)
+
+
+def _say_text(line: dict[str, Any]) -> None:
+    """For a person who started the station by hand."""
+    match line["type"]:
+        case "event":
+            print(f"{line['time_s']:8.2f} s  {line['kind']:<10} {line['text']}", flush=True)
+        case "progress":
+            print(
+                f"            learning {line['kind']} (attempt {line['attempt'] + 1}): "
+                f"{line['timesteps']}/{line['total_timesteps']} steps, "
+                f"reward {line['mean_reward']:.2f}",
+                flush=True,
+            )
+        case "ready":
+            print("ready", flush=True)
+        case "result":
+            print(json.dumps(line["outcome"], indent=2), flush=True)
+        case _:
+            pass

@@ -1,0 +1,97 @@
+"""The station's belief at one tick, for listeners (pure)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from base_station import twin
+from base_station.phases import Concluding, Experimenting, OnMission, Probing, Returning
+from base_station.records import Snapshot, TwinSnapshot, VehicleSnapshot
+from base_station.telemetry import Frame
+
+if TYPE_CHECKING:
+    from base_station.station import Station
+
+Array = NDArray[np.float64]
+
+
+def snapshot(station: Station, frame: Frame) -> Snapshot:
+    """Everything the station knows and believes at `frame`."""
+    watch = station.watch
+    assert watch is not None
+    vehicles = tuple(_vehicle(station, frame, v) for v in range(len(station.view.fleet)))
+    return Snapshot(frame.time_s, station.phase.name, watch.threshold, vehicles, _twins(station))
+
+
+def _vehicle(station: Station, frame: Frame, v: int) -> VehicleSnapshot:
+    watch, member = station.watch, station.view.fleet[v]
+    assert watch is not None
+    status, orders = station.fleet.tracks[v].status, station.orders
+    north, east = (float(x) for x in frame.position_m[v])
+    setpoint = (float(orders.setpoints[v, 0]), float(orders.setpoints[v, 1]))
+    return VehicleSnapshot(
+        sysid=member.sysid,
+        name=member.name,
+        phase=_vehicle_phase(station, v),
+        reported_m=(north, east),
+        velocity_mps=(float(frame.velocity_mps[v, 0]), float(frame.velocity_mps[v, 1])),
+        yaw_rad=float(frame.yaw_rad[v]),
+        setpoint_mps=setpoint if orders.driven[v] else None,
+        motor_outputs=status.motor_outputs,
+        battery_percent=status.battery_percent,
+        gps_satellites=status.gps_satellites,
+        residual=(float(watch.residual[v, 0]), float(watch.residual[v, 1])),
+        cusum=(float(watch.cusum.level[v, 0]), float(watch.cusum.level[v, 1])),
+    )
+
+
+def _vehicle_phase(station: Station, v: int) -> str:
+    driven, delivered = bool(station.orders.driven[v]), station.goals.delivered[v]
+    if station.doubt is not None and station.doubt.suspect == v:
+        return "suspect"
+    match station.phase:
+        case Probing():
+            return "probing" if driven else "idle"
+        case Experimenting() | Concluding():
+            return "experiment" if driven else "held"
+        case OnMission() | Returning():
+            if delivered:
+                return "helping" if driven else "home"
+            return "mission"
+        case _:
+            return "home" if delivered else "idle"
+
+
+def _twins(station: Station) -> tuple[TwinSnapshot, ...]:
+    watch, doubt = station.watch, station.doubt
+    assert watch is not None
+    if doubt is None:
+        known = watch.baseline.known
+        name = known[-1].name if known else "none"
+        return (_twin(name, 1.0, 0.0, watch.state, watch.report_m, watch.sigma_m),)
+    posterior, reports, sigmas = doubt.posterior, doubt.report_m, doubt.sigma_m
+    twins = []
+    for k, hypothesis in enumerate(doubt.twins):
+        sigma = np.zeros_like(reports[k])
+        sigma[doubt.suspect] = sigmas[k]
+        weight = float(doubt.log_weights[k])
+        twins.append(
+            _twin(hypothesis.name, float(posterior[k]), weight, doubt.states[k], reports[k], sigma)
+        )
+    return tuple(twins)
+
+
+def _twin(
+    name: str,
+    posterior: float,
+    log_likelihood: float,
+    state: Array,
+    report_m: Array,
+    sigma_m: Array,
+) -> TwinSnapshot:
+    true_m = state[:, twin.NORTH : twin.EAST + 1].copy()
+    yaw_rad = state[:, twin.YAW].copy()
+    return TwinSnapshot(name, posterior, log_likelihood, true_m, report_m, sigma_m, yaw_rad)

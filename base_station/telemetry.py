@@ -1,0 +1,114 @@
+"""What has been received: per-vehicle history, and the fleet on a common time base."""
+
+from collections import deque
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil import mavlink
+from hil.airframe import pwm_to_output
+
+Array = NDArray[np.float64]
+
+MAX_AGE_S = 0.35  # older than this a sample is not carried forward to a frame
+HISTORY = 64
+
+
+@dataclass(frozen=True)
+class Sample:
+    """LOCAL_POSITION_NED at fleet time: north and east (m, m/s)."""
+
+    time_s: float
+    position_m: tuple[float, float]
+    velocity_mps: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Status:
+    """The slow things a vehicle says of itself."""
+
+    heard: bool = False
+    armed: bool = False
+    mode: int = -1
+    yaw_rad: float = float("nan")
+    motor_outputs: tuple[float, ...] = ()
+    battery_percent: float = float("nan")
+    gps_satellites: int = 0
+    ready: bool = False  # SYS_STATUS pre-arm health
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The fleet at one instant of fleet time. Rows in fleet order; stale rows are NaN."""
+
+    time_s: float
+    position_m: Array  # [V, 2] north, east
+    velocity_mps: Array  # [V, 2]
+    yaw_rad: Array  # [V]
+    fresh: NDArray[np.bool_]  # [V]
+
+
+class Track:
+    """One vehicle's history. Ordered by vehicle time: late and doubled packets change nothing."""
+
+    def __init__(self) -> None:
+        self.status = Status()
+        self.samples: deque[Sample] = deque(maxlen=HISTORY)
+        self.last_heard_wall_s = float("-inf")
+
+    def position(self, sample: Sample) -> None:
+        if not self.samples or sample.time_s > self.samples[-1].time_s:
+            self.samples.append(sample)
+
+    def at(self, time_s: float) -> Sample | None:
+        """The newest sample not after `time_s` (1 ms slack), carried forward; None when stale."""
+        for sample in reversed(self.samples):
+            age_s = time_s - sample.time_s
+            if age_s >= -1e-3:
+                if age_s > MAX_AGE_S:
+                    return None
+                return replace(
+                    sample,
+                    position_m=(
+                        sample.position_m[0] + age_s * sample.velocity_mps[0],
+                        sample.position_m[1] + age_s * sample.velocity_mps[1],
+                    ),
+                )
+        return None
+
+    def newest_s(self) -> float:
+        return self.samples[-1].time_s if self.samples else float("-inf")
+
+
+def note(status: Status, value: object, motors: int) -> Status:
+    """Status after one more message; messages that say nothing of it change nothing."""
+    match value:
+        case mavlink.Heartbeat():
+            return replace(status, heard=True, armed=value.armed, mode=value.custom_mode)
+        case mavlink.Attitude():
+            return replace(status, yaw_rad=value.yaw_rad)
+        case mavlink.ServoOutputs():
+            outputs = tuple(pwm_to_output(p) or 0.0 for p in value.pwm_us[:motors])
+            return replace(status, motor_outputs=outputs)
+        case mavlink.Battery():
+            return replace(status, battery_percent=value.remaining_percent)
+        case mavlink.GpsRaw():
+            return replace(status, gps_satellites=value.satellites)
+        case mavlink.SysStatus():
+            return replace(status, ready=bool(value.health & mavlink.Sensor.PREARM_CHECK))
+        case _:
+            return status
+
+
+def frame_at(tracks: list[Track], time_s: float) -> Frame:
+    """The whole fleet at `time_s`, each vehicle from its newest sample by then."""
+    rows = [t.at(time_s) for t in tracks]
+    nan2 = (float("nan"), float("nan"))
+    return Frame(
+        time_s,
+        np.array([r.position_m if r else nan2 for r in rows]),
+        np.array([r.velocity_mps if r else nan2 for r in rows]),
+        np.array([t.status.yaw_rad for t in tracks]),
+        np.array([r is not None for r in rows]),
+    )
