@@ -1,0 +1,1 @@
+"""One file a MAVLink microservice. Each maps message types to handlers that return replies."""

@@ -1,0 +1,86 @@
+"""Parameters: name, value, type, limits; those of ArduPilot Rover that this autopilot honours.
+
+What has no effect here is not in the table, or is read-only and true.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from hil.airframe import Airframe
+from hil.mavlink import ParamError, ParamType, RoverMode
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One parameter with its default. `low` and `high` are the values it may be set to."""
+
+    name: str
+    default: float
+    low: float
+    high: float
+    param_type: ParamType = ParamType.REAL32
+    read_only: bool = False
+
+
+class Parameters:
+    """A table of parameters with their values; order and number never change."""
+
+    def __init__(self, parameters: Iterable[Parameter]) -> None:
+        self._parameters = {p.name: p for p in parameters}
+        self._values = {p.name: p.default for p in self._parameters.values()}
+        self.names = tuple(sorted(self._parameters))
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._parameters
+
+    def __getitem__(self, name: str) -> float:
+        return self._values[name]
+
+    def parameter(self, name: str) -> Parameter:
+        return self._parameters[name]
+
+    def name_at(self, index: int) -> str | None:
+        return self.names[index] if 0 <= index < len(self.names) else None
+
+    def set(self, name: str, value: float) -> ParamError | None:
+        """Set a parameter that exists; None when it is done. Integers are cut, as by a C cast."""
+        parameter = self._parameters[name]
+        if parameter.param_type is not ParamType.REAL32:
+            value = float(int(value))
+        if parameter.read_only:
+            return None if value == self._values[name] else ParamError.READ_ONLY
+        if not parameter.low <= value <= parameter.high:
+            return ParamError.VALUE_OUT_OF_RANGE
+        self._values[name] = value
+        return None
+
+
+def _fixed(name: str, value: float, param_type: ParamType = ParamType.INT16) -> Parameter:
+    return Parameter(name, value, value, value, param_type, read_only=True)
+
+
+def rover_parameters(sysid: int, station_sysid: int, airframe: Airframe) -> Parameters:
+    """The table that a ground station sees. Names and units are ArduPilot Rover 4.6's."""
+    limit_mps = airframe.speed_limit_mps
+    int8, int16 = ParamType.INT8, ParamType.INT16
+    cruise_mps = airframe.motors[0].free_speed_mps / 2.0  # speed at CRUISE_THROTTLE percent
+    return Parameters(
+        (
+            _fixed("CRUISE_SPEED", cruise_mps, ParamType.REAL32),
+            _fixed("CRUISE_THROTTLE", 50, int8),
+            _fixed("FORMAT_VERSION", 16),
+            _fixed("FRAME_CLASS", 1, int8),
+            _fixed("FRAME_TYPE", 3, int8),  # omni plus
+            Parameter("FS_GCS_ENABLE", 1, 0, 1, int8),
+            Parameter("FS_TIMEOUT", 5, 1, 100),
+            _fixed("FS_ACTION", 2, int8),  # hold
+            _fixed("INITIAL_MODE", RoverMode.HOLD, int8),
+            *(_fixed(f"SERVO{i}_FUNCTION", 32 + i) for i in range(1, len(airframe.motors) + 1)),
+            *(_fixed(f"SERVO{i}_MIN", 1100) for i in range(1, len(airframe.motors) + 1)),
+            *(_fixed(f"SERVO{i}_MAX", 1900) for i in range(1, len(airframe.motors) + 1)),
+            *(_fixed(f"SERVO{i}_TRIM", 1500) for i in range(1, len(airframe.motors) + 1)),
+            Parameter("SYSID_MYGCS", station_sysid, 1, 255, int16),
+            _fixed("SYSID_THISMAV", sysid),
+            Parameter("WP_SPEED", limit_mps, 0.05, limit_mps),
+        )
+    )

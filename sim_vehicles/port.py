@@ -1,0 +1,42 @@
+"""A MAVLink port: one link of the vehicle, with its own services, sequence and outbox.
+
+Nothing crosses from port to port: each knows only what its own services tell.
+"""
+
+from collections.abc import Iterable
+
+from hil.mavlink import COMPONENT_AUTOPILOT, Decoder, Encoder, Message
+from sim_vehicles.services.service import Handlers, Request
+
+
+class Port:
+    """Hands what arrives to the service for it, and queues what is to be sent."""
+
+    def __init__(self, sysid: int, handlers: Handlers) -> None:
+        self._sysid, self._handlers = sysid, handlers
+        self._decoder = Decoder()
+        self._encoder = Encoder(sysid, COMPONENT_AUTOPILOT)
+        self._outbox: list[bytes] = []
+
+    def receive(self, datagram: bytes, now_s: float) -> None:
+        """Handle all frames of a datagram that are meant for this vehicle."""
+        for received in self._decoder.decode(datagram):
+            value = received.value
+            if not isinstance(value, Message) or not self._is_for_us(value):
+                continue
+            handler = self._handlers.get(type(value))
+            if handler is not None:
+                self.send(handler(Request(now_s, received.sysid, received.compid, value)))
+
+    def send(self, messages: Iterable[Message]) -> None:
+        self._outbox.extend(map(self._encoder.encode, messages))
+
+    def drain(self) -> list[bytes]:
+        """All that is to be sent, oldest first."""
+        outbox, self._outbox = self._outbox, []
+        return outbox
+
+    def _is_for_us(self, value: Message) -> bool:
+        return getattr(value, "target_sysid", 0) in (0, self._sysid) and getattr(
+            value, "target_compid", 0
+        ) in (0, COMPONENT_AUTOPILOT)

@@ -1,0 +1,58 @@
+"""The command protocol: COMMAND_LONG and COMMAND_INT, each answered by exactly one COMMAND_ACK."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from hil.mavlink import CommandAck, CommandInt, CommandLong, Message, Result
+from sim_vehicles.services.service import Handlers, Replies, Request
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """A command with its 7 params; NaN where the sender gave none."""
+
+    now_s: float
+    params: tuple[float, ...]
+
+    def integer(self, number: int) -> int | None:
+        """Param `number` (from 1) if it is a whole number."""
+        value = self.params[number - 1]
+        return int(value) if math.isfinite(value) and value == int(value) else None
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What the ACK shall say, and messages to send after it."""
+
+    result: Result
+    messages: tuple[Message, ...] = ()
+
+
+DENIED = Outcome(Result.DENIED)
+UNSUPPORTED = Outcome(Result.UNSUPPORTED)
+Executor = Callable[[Order], Outcome]
+
+
+class CommandService:
+    """Looks commands up by number; an unknown one is UNSUPPORTED, never silence."""
+
+    def __init__(self, executors: Mapping[int, Executor]) -> None:
+        self._executors = dict(executors)
+
+    def handlers(self) -> Handlers:
+        return {CommandLong: self._long, CommandInt: self._int}
+
+    def _long(self, request: Request) -> Replies:
+        return self._execute(request, request.value.params)
+
+    def _int(self, request: Request) -> Replies:
+        value: CommandInt = request.value
+        return self._execute(request, (*value.params, float(value.x), float(value.y), value.z))
+
+    def _execute(self, request: Request, params: tuple[float, ...]) -> Replies:
+        number = request.value.command
+        executor = self._executors.get(number)
+        outcome = executor(Order(request.now_s, params)) if executor else UNSUPPORTED
+        ack = CommandAck(number, outcome.result, request.sysid, request.compid)
+        return [ack, *outcome.messages]

@@ -1,0 +1,150 @@
+"""Telemetry: a snapshot of the vehicle to messages (pure)."""
+
+import math
+from dataclasses import dataclass
+
+from hil.frames import Origin, ned_to_wgs84
+from hil.mavlink import (
+    AUTOPILOT_ARDUPILOT,
+    MODE_FLAG_CUSTOM,
+    MODE_FLAG_GUIDED,
+    MODE_FLAG_MANUAL,
+    TYPE_ROVER,
+    Attitude,
+    AutopilotVersion,
+    Battery,
+    Capability,
+    ExtendedSysState,
+    FixType,
+    GlobalPosition,
+    GpsOrigin,
+    GpsRaw,
+    Heartbeat,
+    HomePosition,
+    LocalPosition,
+    MissionCurrent,
+    RoverMode,
+    Sensor,
+    ServoOutputs,
+    SysStatus,
+)
+from sim_vehicles.autopilot import Autopilot, system_status
+from sim_vehicles.battery import BatteryState
+from sim_vehicles.estimator import Estimate
+from sim_vehicles.sensors import GpsFix, Vector
+
+ON_GROUND = 1  # MAV_LANDED_STATE_ON_GROUND
+SATELLITES, HDOP = 18, 0.7
+CPU_LOAD = 0.25
+VERSION = (4, 6, 0, 255)  # the ArduPilot release whose behaviour is followed; 255 is 'official'
+_MODE_FLAGS = {RoverMode.MANUAL: MODE_FLAG_MANUAL, RoverMode.GUIDED: MODE_FLAG_GUIDED}
+_ALWAYS_HEALTHY = (
+    Sensor.GYRO | Sensor.ACCEL | Sensor.MAG | Sensor.YAW_POSITION | Sensor.XY_POSITION_CONTROL
+) | (Sensor.MOTOR_OUTPUTS | Sensor.BATTERY)
+_WHEN_READY = Sensor.AHRS | Sensor.PREARM_CHECK
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """All that telemetry may tell. There is no fault in it, so none can be told."""
+
+    sysid: int
+    now_s: float
+    origin: Origin
+    estimate: Estimate
+    ready: bool
+    autopilot: Autopilot
+    fix: GpsFix | None
+    home_m: Vector | None
+    pwm_us: tuple[int, ...]
+    battery: BatteryState
+
+
+def heartbeat(s: Snapshot) -> Heartbeat:
+    status = system_status(s.autopilot, s.ready)
+    base_mode = MODE_FLAG_CUSTOM | _MODE_FLAGS.get(s.autopilot.mode, 0)
+    mode = s.autopilot.mode
+    return Heartbeat(
+        TYPE_ROVER, AUTOPILOT_ARDUPILOT, s.autopilot.armed, int(mode), int(status), base_mode
+    )
+
+
+def sys_status(s: Snapshot) -> SysStatus:
+    present = int(_ALWAYS_HEALTHY | _WHEN_READY | Sensor.GPS)
+    health = int(_ALWAYS_HEALTHY)
+    if s.fix is not None:
+        health |= int(Sensor.GPS)
+    if s.ready:
+        health |= int(_WHEN_READY)
+    battery = (s.battery.voltage_v, s.battery.current_a, s.battery.remaining_percent)
+    return SysStatus(present, present, health, CPU_LOAD, *battery)
+
+
+def gps_raw(s: Snapshot) -> GpsRaw:
+    if s.fix is None:
+        return GpsRaw(s.now_s, FixType.NO_FIX, 0.0, 0.0, 0.0, 99.99, 0.0, 0.0, 0)
+    (n, e, d), (vn, ve, _) = s.fix.position_m, s.fix.velocity_mps
+    lat, lon = ned_to_wgs84(n, e, s.origin)
+    motion = (math.hypot(vn, ve), math.atan2(ve, vn))
+    where = (lat, lon, s.origin.alt_m - d)
+    return GpsRaw(s.fix.time_s, FixType.RTK_FIXED, *where, HDOP, *motion, SATELLITES)
+
+
+def global_position(s: Snapshot) -> GlobalPosition | None:
+    if s.home_m is None:
+        return None
+    n, e, d = s.estimate.position_m
+    lat, lon = ned_to_wgs84(n, e, s.origin)
+    heights = (s.origin.alt_m - d, s.home_m[2] - d)
+    return GlobalPosition(s.now_s, lat, lon, *heights, s.estimate.velocity_mps, s.estimate.yaw_rad)
+
+
+def local_position(s: Snapshot) -> LocalPosition | None:
+    if s.home_m is None:
+        return None
+    return LocalPosition(s.now_s, s.estimate.position_m, s.estimate.velocity_mps)
+
+
+def attitude(s: Snapshot) -> Attitude:
+    return Attitude(s.now_s, 0.0, 0.0, s.estimate.yaw_rad, *s.estimate.gyro_radps)
+
+
+def servo_outputs(s: Snapshot) -> ServoOutputs:
+    return ServoOutputs(s.now_s, s.pwm_us)
+
+
+def battery_status(s: Snapshot) -> Battery:
+    b = s.battery
+    return Battery(b.voltage_v, b.current_a, b.consumed_mah, b.remaining_percent)
+
+
+def extended_sys_state(_s: Snapshot) -> ExtendedSysState:
+    return ExtendedSysState(ON_GROUND)
+
+
+def home_position(s: Snapshot) -> HomePosition | None:
+    if s.home_m is None:
+        return None
+    lat, lon = ned_to_wgs84(s.home_m[0], s.home_m[1], s.origin)
+    return HomePosition(lat, lon, s.origin.alt_m - s.home_m[2], s.home_m)
+
+
+def gps_origin(s: Snapshot) -> GpsOrigin | None:
+    if s.home_m is None:
+        return None
+    return GpsOrigin(s.origin.lat_deg, s.origin.lon_deg, s.origin.alt_m)
+
+
+def mission_current(_s: Snapshot) -> MissionCurrent:
+    return MissionCurrent(0, 0)
+
+
+def autopilot_version(s: Snapshot) -> AutopilotVersion:
+    capabilities = (
+        Capability.PARAM_FLOAT
+        | Capability.PARAM_ENCODE_C_CAST
+        | Capability.COMMAND_INT
+        | Capability.SET_POSITION_TARGET_LOCAL_NED
+        | Capability.MAVLINK2
+    )
+    return AutopilotVersion(int(capabilities), VERSION, s.sysid)

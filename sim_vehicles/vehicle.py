@@ -1,0 +1,238 @@
+"""A vehicle: sensors, estimator, autopilot, control and services put together (no I/O, no clock).
+
+Time is physics time. One `step` is one frame of the autopilot: physics state in, PWM out.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Literal
+
+from hil.airframe import output_to_pwm
+from hil.frames import wrap_pi
+from hil.mavlink import Heartbeat, Message, MessageId, Result, RoverMode, Severity, StatusText
+from hil.physics_link import PhysicsState, pad_channels
+from hil.scenario import Scenario
+from sim_vehicles import telemetry
+from sim_vehicles.autopilot import (
+    Autopilot,
+    Target,
+    Transition,
+    accept_target,
+    check_gcs,
+    check_target,
+)
+from sim_vehicles.battery import BatteryState, drain
+from sim_vehicles.control import Drive, Memory, drive_at, velocity_towards
+from sim_vehicles.estimator import Estimate, Estimator
+from sim_vehicles.parameters import rover_parameters
+from sim_vehicles.port import Port
+from sim_vehicles.sensors import Gps, GpsFix, InertialSensors, Vector
+from sim_vehicles.services import ftp, mission, time
+from sim_vehicles.services.commands import CommandService
+from sim_vehicles.services.failure import FailureService, injection_parameters
+from sim_vehicles.services.mode import Change, ModeService
+from sim_vehicles.services.parameters import ParameterService
+from sim_vehicles.services.service import Replies, Request, merged
+from sim_vehicles.services.setpoints import SetpointService
+from sim_vehicles.services.streams import Builder, StreamService
+from sim_vehicles.telemetry import Snapshot
+
+PortName = Literal["gcs", "injector"]
+_TELEMETRY: Mapping[MessageId, Callable[[Snapshot], Message | None]] = {
+    MessageId.HEARTBEAT: telemetry.heartbeat,
+    MessageId.SYS_STATUS: telemetry.sys_status,
+    MessageId.GPS_RAW_INT: telemetry.gps_raw,
+    MessageId.GLOBAL_POSITION_INT: telemetry.global_position,
+    MessageId.LOCAL_POSITION_NED: telemetry.local_position,
+    MessageId.ATTITUDE: telemetry.attitude,
+    MessageId.SERVO_OUTPUT_RAW: telemetry.servo_outputs,
+    MessageId.BATTERY_STATUS: telemetry.battery_status,
+    MessageId.EXTENDED_SYS_STATE: telemetry.extended_sys_state,
+    MessageId.HOME_POSITION: telemetry.home_position,
+    MessageId.GPS_GLOBAL_ORIGIN: telemetry.gps_origin,
+    MessageId.MISSION_CURRENT: telemetry.mission_current,
+    MessageId.AUTOPILOT_VERSION: telemetry.autopilot_version,
+}
+
+
+def default_rates_hz(telemetry_hz: float) -> dict[int, float]:
+    """What streams unprompted on the station's port."""
+    return {
+        MessageId.HEARTBEAT: 1.0,
+        MessageId.SYS_STATUS: 1.0,
+        MessageId.GPS_RAW_INT: 2.0,
+        MessageId.GLOBAL_POSITION_INT: 2.0,
+        MessageId.LOCAL_POSITION_NED: telemetry_hz,
+        MessageId.ATTITUDE: telemetry_hz,
+        MessageId.SERVO_OUTPUT_RAW: 2.0,
+        MessageId.BATTERY_STATUS: 0.5,
+        MessageId.EXTENDED_SYS_STATE: 1.0,
+        MessageId.HOME_POSITION: 0.5,
+        MessageId.GPS_GLOBAL_ORIGIN: 0.5,
+        MessageId.MISSION_CURRENT: 1.0,
+    }
+
+
+class Vehicle:
+    """One simulated rover. `receive` answers at once into the outbox of the same port."""
+
+    def __init__(self, scenario: Scenario, sysid: int) -> None:
+        member = scenario.vehicle(sysid)
+        self._sysid, self._origin = sysid, scenario.origin.origin()
+        self._drive = Drive.of(member.frame, scenario.yaw == "locked")
+        self._inertial = InertialSensors(scenario.sensors, scenario.seed, sysid)
+        self._gps = Gps(scenario.sensors, scenario.seed, sysid)
+        self._estimator = Estimator(scenario.sensors)
+        self._parameters = rover_parameters(sysid, scenario.links.station_sysid, member.frame)
+        self._autopilot = Autopilot()
+        self._battery = BatteryState()
+        self._memory = Memory()
+        self._now_s: float | None = None
+        self._gcs_heard_s: float | None = None
+        self._fix: GpsFix | None = None
+        self._home_m: Vector | None = None
+        self._pwm = pad_channels(())
+        self._connect(scenario.clock.telemetry_hz)
+
+    def _connect(self, telemetry_hz: int) -> None:
+        """Two ports with services of their own; only the injector's can break the vehicle."""
+        builders: dict[int, Builder] = {
+            number: partial(self._build, build) for number, build in _TELEMETRY.items()
+        }
+        modes = ModeService(self._apply)
+        setpoints = SetpointService(self._estimator.estimate, self._accept)
+        streams = StreamService(builders, default_rates_hz(telemetry_hz))
+        gcs = merged(
+            {Heartbeat: self._heard},
+            CommandService({**streams.executors(), **modes.executors()}).handlers(),
+            ParameterService(self._parameters).handlers(),
+            *(service.handlers() for service in (modes, setpoints, streams)),
+            *(module.handlers() for module in (time, mission, ftp)),
+        )
+        sizes = injection_parameters()
+        self._failures = FailureService(sizes, len(self._drive.airframe.motors))
+        beats = StreamService(builders, {MessageId.HEARTBEAT: 1.0})
+        injector = merged(
+            CommandService({**beats.executors(), **self._failures.executors()}).handlers(),
+            ParameterService(sizes).handlers(),
+            *(module.handlers() for module in (time, mission, ftp)),
+        )
+        self._ports = {"gcs": Port(self._sysid, gcs), "injector": Port(self._sysid, injector)}
+        self._streams = (("gcs", streams), ("injector", beats))
+
+    def receive(self, port: PortName, datagram: bytes) -> None:
+        """Handle a datagram now. Bad frames and frames for others change nothing."""
+        self._ports[port].receive(datagram, self._now_s or 0.0)
+
+    def outbox(self, port: PortName) -> list[bytes]:
+        """Frames to send on a port since the last call, oldest first."""
+        return self._ports[port].drain()
+
+    def step(self, state: PhysicsState) -> tuple[int, ...]:
+        """One frame: 16 PWM values (us) for the physics, after motor faults.
+
+        A state that is not newer than the last one changes nothing.
+        """
+        last_s = state.time_s if self._now_s is None else self._now_s
+        if self._now_s is None or state.time_s > last_s:
+            self._now_s = state.time_s
+            dt_s = state.time_s - last_s
+            self._sense(state, dt_s)
+            self._watch(state.time_s)
+            self._pwm = self._control(dt_s)
+            for port, streams in self._streams:
+                messages = streams.step(state.time_s)
+                if messages:
+                    self._ports[port].send(messages)
+        return self._broken(self._pwm)
+
+    def _sense(self, state: PhysicsState, dt_s: float) -> None:
+        self._estimator.inertial(self._inertial.sample(state), dt_s)
+        fix = self._gps.sample(state, self._failures.active.gps_stuck_mask)
+        if fix is not None:
+            self._fix = fix
+            self._estimator.gps(fix)
+        if self._home_m is None and self._estimator.ready:
+            self._home_m = self._estimator.estimate().position_m
+            self._tell((StatusText(Severity.INFO, "Position estimate ready"),))
+
+    def _watch(self, now_s: float) -> None:
+        """Time-outs and failsafes."""
+        silence_s = None
+        if self._gcs_heard_s is not None and self._parameters["FS_GCS_ENABLE"]:
+            silence_s = now_s - self._gcs_heard_s
+        timeout_s = self._parameters["FS_TIMEOUT"]
+        self._apply(lambda state, _ready: check_gcs(state, silence_s, timeout_s))
+        self._apply(lambda state, _ready: check_target(state, now_s))
+
+    def _control(self, dt_s: float) -> tuple[int, ...]:
+        """PWM as commanded, 16 channels."""
+        estimate = self._estimator.estimate()
+        if not self._autopilot.drives or self._autopilot.mode is not RoverMode.GUIDED:
+            self._memory = Memory(yaw_rad=estimate.yaw_rad)
+            self._battery = drain(self._battery, (), dt_s)
+            output = 0.0 if self._autopilot.drives else None
+            return pad_channels([output_to_pwm(output)] * len(self._drive.airframe.motors))
+        velocity = self._aim(estimate, dt_s)
+        outputs, self._memory = drive_at(self._drive, self._memory, estimate, velocity, dt_s)
+        self._battery = drain(self._battery, outputs, dt_s)
+        return pad_channels([output_to_pwm(output) for output in outputs])
+
+    def _aim(self, estimate: Estimate, dt_s: float) -> tuple[float, float]:
+        """The velocity that the target asks for now; turns the heading to hold towards it."""
+        target = self._autopilot.target
+        if target is None:
+            return 0.0, 0.0
+        if target.yaw_rad is not None:
+            self._memory = replace(self._memory, yaw_rad=target.yaw_rad)
+        elif target.yaw_rate_radps is not None:
+            yaw_rad = wrap_pi(self._memory.yaw_rad + target.yaw_rate_radps * dt_s)
+            self._memory = replace(self._memory, yaw_rad=yaw_rad)
+        if target.position_m is not None:
+            return velocity_towards(target.position_m, estimate, self._parameters["WP_SPEED"])
+        return target.velocity_mps or (0.0, 0.0)
+
+    def _broken(self, pwm_us: tuple[int, ...]) -> tuple[int, ...]:
+        """The same PWM with broken motors off: after reporting, so that the fault is silent."""
+        off = self._failures.active.motors_off
+        if not off:
+            return pwm_us
+        return tuple(0 if i in off else pwm for i, pwm in enumerate(pwm_us, start=1))
+
+    def _apply(self, change: Change) -> Result:
+        transition: Transition = change(self._autopilot, self._estimator.ready)
+        before, self._autopilot = self._autopilot, transition.state
+        if (before.mode, before.armed) != (self._autopilot.mode, self._autopilot.armed):
+            self._memory = Memory(yaw_rad=self._estimator.estimate().yaw_rad)
+        self._tell(transition.texts)
+        return transition.result
+
+    def _accept(self, target: Target) -> None:
+        self._autopilot = accept_target(self._autopilot, target)
+
+    def _heard(self, request: Request) -> Replies:
+        if request.sysid == self._parameters["SYSID_MYGCS"]:
+            self._gcs_heard_s = request.now_s
+        return []
+
+    def _tell(self, texts: tuple[StatusText, ...]) -> None:
+        for port in self._ports.values() if texts else ():
+            port.send(texts)
+
+    def _build(self, build: Callable[[Snapshot], Message | None]) -> Message | None:
+        return build(self._snapshot())
+
+    def _snapshot(self) -> Snapshot:
+        return Snapshot(
+            sysid=self._sysid,
+            now_s=self._now_s or 0.0,
+            origin=self._origin,
+            estimate=self._estimator.estimate(),
+            ready=self._estimator.ready,
+            autopilot=self._autopilot,
+            fix=self._fix,
+            home_m=self._home_m,
+            pwm_us=self._pwm,
+            battery=self._battery,
+        )
