@@ -1,0 +1,122 @@
+"""The injector: breaks a vehicle over MAVLink, from its own system id, on its own link (pure).
+
+`step(now, received)` returns what to send; the same code runs over UDP and in memory. Parameters
+go first, then commands, one at a time, each sent again until it is echoed or acknowledged.
+"""
+
+import math
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from hil.errors import InputError
+from hil.faults import to_injection
+from hil.mavlink import (
+    COMPONENT_GCS,
+    Command,
+    CommandAck,
+    Decoder,
+    Encoder,
+    ParamFailed,
+    ParamValue,
+    Received,
+    Result,
+)
+from hil.scenario import FaultModel
+
+RESEND_S = 0.5
+
+
+@dataclass(frozen=True)
+class SetParameter:
+    name: str
+    value: float
+
+    def datagram(self, encoder: Encoder, target: int) -> bytes:
+        return encoder.param_set(target, self.name, self.value)
+
+    def answered_by(self, value: object) -> bool:
+        return isinstance(value, ParamValue) and value.name == self.name
+
+    def refusal(self, value: object) -> str | None:
+        """Why `value` says no, if it does."""
+        if isinstance(value, ParamFailed) and value.name == self.name:
+            return f"parameter {self.name}: error {value.error}"
+        if isinstance(value, ParamValue) and value.name == self.name:
+            if math.isclose(value.value, self.value, rel_tol=1e-6):
+                return None
+            return f"parameter {self.name}: stays {value.value:g} instead of {self.value:g}"
+        return None
+
+
+@dataclass(frozen=True)
+class InjectFailure:
+    unit: int
+    type: int
+    instance: int
+
+    def datagram(self, encoder: Encoder, target: int) -> bytes:
+        return encoder.inject_failure(target, self.unit, self.type, self.instance)
+
+    def answered_by(self, value: object) -> bool:
+        return (
+            isinstance(value, CommandAck)
+            and value.command == Command.INJECT_FAILURE
+            and value.result != Result.IN_PROGRESS
+        )
+
+    def refusal(self, value: object) -> str | None:
+        """Why `value` says no, if it does."""
+        if not isinstance(value, CommandAck) or not self.answered_by(value):
+            return None
+        if value.result == Result.ACCEPTED:
+            return None
+        numbers = f"unit {self.unit}, type {self.type}, instance {self.instance}"
+        return f"MAV_CMD_INJECT_FAILURE ({numbers}): result {value.result}"
+
+
+Order = SetParameter | InjectFailure
+
+
+class Injector:
+    """Injects faults into one vehicle, in the order they are added."""
+
+    def __init__(self, name: str, target: int, sysid: int) -> None:
+        self.name, self.target = name, target
+        self._encoder = Encoder(sysid, COMPONENT_GCS)
+        self._decoder = Decoder()
+        self._orders: deque[Order] = deque()
+        self._sent_s = -math.inf
+
+    @property
+    def done(self) -> bool:
+        """Everything that was added is in effect."""
+        return not self._orders
+
+    def add(self, fault: FaultModel) -> None:
+        injection = to_injection(fault.fault())
+        self._orders += [SetParameter(name, value) for name, value in injection.parameters]
+        self._orders += [InjectFailure(*numbers) for numbers in injection.commands]
+
+    def step(self, now_s: float, datagrams: Iterable[bytes]) -> list[bytes]:
+        """Datagrams to send. Raises InputError when the vehicle refuses."""
+        for datagram in datagrams:
+            for received in self._decoder.decode(datagram):
+                self._take(received)
+        if not self._orders or now_s - self._sent_s < RESEND_S:
+            return []
+        self._sent_s = now_s
+        return [self._orders[0].datagram(self._encoder, self.target)]
+
+    def _take(self, received: Received) -> None:
+        if received.sysid != self.target or not self._orders:
+            return
+        order, value = self._orders[0], received.value
+        why_not = order.refusal(value)
+        if why_not is not None:
+            raise InputError(
+                f"{self.name} refuses the fault: {why_not}; the scenario needs one it can make"
+            )
+        if order.answered_by(value):
+            self._orders.popleft()
+            self._sent_s = -math.inf  # the next one goes at once

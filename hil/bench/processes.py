@@ -1,0 +1,206 @@
+"""Child processes: started, listened to, watched, and stopped without leaving an orphan."""
+
+import ctypes
+import json
+import os
+import selectors
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from hil.errors import ProcessDiedError
+
+STOP_WITHIN_S = 3.0
+_PR_SET_PDEATHSIG = 1
+_PARENT_GONE = 1
+
+
+@dataclass(frozen=True)
+class Command:
+    """A process to start; its stderr goes to `log`."""
+
+    name: str
+    argv: tuple[str, ...]
+    log: Path
+    cwd: Path | None = None
+    takes_lines: bool = False
+
+
+class Child:
+    """One running process in a group of its own."""
+
+    def __init__(self, command: Command) -> None:
+        self.name, self.log = command.name, command.log
+        self.ready = False
+        self.may_end = False
+        self._rest = b""
+        with command.log.open("wb") as log:
+            self.process = subprocess.Popen(
+                command.argv,
+                cwd=command.cwd,
+                stdin=subprocess.PIPE if command.takes_lines else subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                bufsize=0,
+                start_new_session=True,
+                preexec_fn=_dying_with_parent(),
+            )
+        assert self.process.stdout is not None
+        self.stdout = self.process.stdout
+        os.set_blocking(self.stdout.fileno(), False)
+
+    def send(self, line: str) -> None:
+        """To its stdin; one that has died is noticed elsewhere."""
+        assert self.process.stdin is not None
+        with suppress(BrokenPipeError):
+            self.process.stdin.write(line.encode() + b"\n")
+
+    def read(self) -> tuple[list[str], bool]:
+        """The whole lines that have come, and whether more may come."""
+        more = True
+        while True:
+            data = self.stdout.read(1 << 16)
+            if not data:
+                more = data is None
+                break
+            self._rest += data
+        *lines, self._rest = self._rest.split(b"\n")
+        return [line.decode(errors="replace") for line in lines], more
+
+    def death(self) -> str | None:
+        """How it ended, in words with its last line of stderr; None while it lives."""
+        code = self.process.poll()
+        if code is None:
+            return None
+        if code < 0:
+            how = f"was killed by {signal.Signals(-code).name}"
+        else:
+            how = f"ended with exit code {code}"
+        words = self.log.read_text(errors="replace").split("\n") if self.log.exists() else []
+        last = next((w.strip() for w in reversed(words) if w.strip()), "")
+        return f"{self.name} {how}{f': {last}' if last else ''} (see {self.log.name})"
+
+    def signal_group(self, number: signal.Signals) -> None:
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(self.process.pid, number)
+
+    def close(self) -> None:
+        self.stdout.close()
+        if self.process.stdin is not None:
+            with suppress(BrokenPipeError):
+                self.process.stdin.close()
+
+
+def _dying_with_parent() -> Callable[[], None] | None:
+    """What the child does before it runs: ask the kernel for SIGKILL when this process is gone.
+
+    Only Linux has that; elsewhere a SIGKILLed bench leaves children that stop by themselves
+    when their links fall silent.
+    """
+    if sys.platform != "linux":
+        return None
+    prctl, parent = ctypes.CDLL(None).prctl, os.getpid()
+
+    def ask() -> None:
+        prctl(_PR_SET_PDEATHSIG, int(signal.SIGKILL))
+        if os.getppid() != parent:
+            os._exit(_PARENT_GONE)
+
+    return ask
+
+
+class Children:
+    """All processes of a run. `on_line(name, line)` gets what they say; leaving stops them."""
+
+    def __init__(self, on_line: Callable[[str, str], None]) -> None:
+        self._on_line = on_line
+        self._children: list[Child] = []
+        self._selector = selectors.DefaultSelector()
+
+    def __enter__(self) -> "Children":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def start(self, command: Command) -> Child:
+        """Raises ProcessDiedError when it can't even be started."""
+        try:
+            child = Child(command)
+        except OSError as error:
+            raise ProcessDiedError(f"{command.name} cannot be started: {error}") from None
+        self._children.append(child)
+        self._selector.register(child.stdout, selectors.EVENT_READ, child)
+        return child
+
+    def pump(self, timeout_s: float) -> None:
+        """Hear what the children say. Raises ProcessDiedError when one has died."""
+        for key, _ in self._selector.select(timeout_s):
+            self._hear(key.data)
+        for child in self._children:
+            death = child.death()
+            if death is None or child.may_end:
+                continue
+            self._hear(child)
+            if not child.may_end:  # its last line may have been its farewell
+                raise ProcessDiedError(death)
+
+    def wait_ready(self, within_s: float) -> None:
+        """Until all have said `ready`. Raises ProcessDiedError naming who has not."""
+        deadline_s = time.monotonic() + within_s
+        while late := [c.name for c in self._children if not c.ready]:
+            if time.monotonic() > deadline_s:
+                raise ProcessDiedError(f"{', '.join(late)} not ready within {within_s:.0f} s")
+            self.pump(0.1)
+
+    def wait_end(self, child: Child, within_s: float) -> None:
+        """Give a child time to end by itself; whatever happens it is stopped later."""
+        child.may_end = True
+        deadline_s = time.monotonic() + within_s
+        while child.death() is None and time.monotonic() < deadline_s:
+            self.pump(0.05)
+
+    def stop(self) -> None:
+        """SIGTERM, SIGKILL after 3 s, and SIGKILL for whatever they have started themselves."""
+        for child in self._children:
+            child.may_end = True
+            if child.process.poll() is None:
+                child.process.terminate()
+        deadline_s = time.monotonic() + STOP_WITHIN_S
+        while self._anyone_alive() and time.monotonic() < deadline_s:
+            self.pump(0.05)
+        for child in self._children:
+            child.signal_group(signal.SIGKILL)
+            child.process.wait()
+            self._hear(child)
+            child.close()
+        self._selector.close()
+        self._children.clear()
+
+    def _anyone_alive(self) -> bool:
+        return any(c.process.poll() is None for c in self._children)
+
+    def _hear(self, child: Child) -> None:
+        if child.stdout.closed:
+            return
+        lines, more = child.read()
+        if not more and child.stdout in self._selector.get_map():
+            self._selector.unregister(child.stdout)
+        for line in lines:
+            child.ready = child.ready or _is_ready(line)
+            self._on_line(child.name, line)
+
+
+def _is_ready(line: str) -> bool:
+    if line == "ready":
+        return True
+    if not line.startswith("{"):
+        return False
+    with suppress(ValueError):
+        return bool(json.loads(line).get("type") == "ready")
+    return False
