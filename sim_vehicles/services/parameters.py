@@ -1,4 +1,4 @@
-"""The parameter protocol: list, read by name or index, set. Integers are C-cast like ArduPilot's."""
+"""The parameter protocol: list, read by name or index, set. Integers are C-cast."""
 
 from hil.mavlink import (
     Message,
