@@ -66,7 +66,7 @@ class OpenLoopPlan:
 
 @dataclass(frozen=True)
 class PolicyWeights:
-    """A tanh MLP as plain arrays: what a closed-loop plan is. Layers are (weight [out, in], bias)."""
+    """A closed-loop plan: a tanh MLP as plain arrays. Layers are (weight [out, in], bias)."""
 
     layers: tuple[tuple[Array, Array], ...]
 
@@ -143,7 +143,10 @@ def _hypothesis(tree: dict[str, Any]) -> Hypothesis:
         tree["prior"],
         fault
         and Fault(
-            Unit(fault["unit"]), Type(fault["type"]), tuple(fault["instances"]), tuple(fault["axes"])
+            Unit(fault["unit"]),
+            Type(fault["type"]),
+            tuple(fault["instances"]),
+            tuple(fault["axes"]),
         ),
     )
 

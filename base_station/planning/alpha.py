@@ -1,0 +1,157 @@
+"""Learning to tell hypotheses apart: twins under the same commands, rewarded for disagreeing."""
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from base_station.planning.policy import Commands, act, to_setpoints
+from base_station.planning.requests import PolicyWeights
+from base_station.planning.starts import scattered
+from base_station.planning.tasks import Step
+from base_station.twin import (
+    EAST,
+    NORTH,
+    V_EAST,
+    V_NORTH,
+    YAW,
+    FaultArrays,
+    FleetModel,
+    Parameters,
+    advance_in_place,
+    perturbed,
+    report,
+)
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Rho = Literal["own_state", "printed"]
+
+START_SIGMA_M = 0.03
+WALL_COST = 1.0  # per vehicle, twin and control period
+NEAR_START_SHARE = 0.5  # of the episodes at first start near the suspect; fades to none half-way
+SCALE_M = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class AlphaProblem:
+    """Tell the hypotheses in `faults` apart from states `start` [H, V, S] in `steps` periods.
+
+    `rho` says what a twin starts each step from: its own state (the paper's workflow) or the first
+    one's (the formula as printed).
+    """
+
+    model: FleetModel
+    faults: FaultArrays
+    start: Array
+    commands: Commands
+    suspect: int
+    period_s: float
+    steps: int
+    rho: Rho = "own_state"
+
+    def move(self, parameters: Parameters, states: Array, setpoints: Array) -> Flags:
+        """One control period of states [E, H, V, S] in place; returns wall touches [E, H, V]."""
+        hypotheses = states.shape[1]
+        batch = states.reshape(-1, *states.shape[2:])
+        walls = np.zeros(batch.shape[:2], dtype=np.bool_)
+        advance_in_place(
+            self.model,
+            parameters,
+            self.faults,
+            batch,
+            np.repeat(setpoints, hypotheses, axis=0),
+            np.tile(self.commands.driven, (len(batch), 1)),
+            self.period_s,
+            np.empty((len(batch), 0, 0)),
+            walls,
+        )
+        return walls.reshape(states.shape[:3])
+
+    def reports(self, states: Array) -> Array:
+        """[E, H, V, 2] of states [E, H, V, S]."""
+        flat = report(states.reshape(-1, *states.shape[2:]), self.faults)
+        return flat.reshape(*states.shape[:3], 2)
+
+    def observe(self, states: Array, elapsed: NDArray[np.int64]) -> Array:
+        """[E, O]: where each twin believes all to be, how their reports differ, and the time."""
+        reports = self.reports(states)
+        origin = self.start[0, self.suspect, NORTH : EAST + 1]
+        blocks: list[Array] = [
+            (states[..., NORTH : EAST + 1] - origin) / SCALE_M,
+            states[..., V_NORTH : V_EAST + 1] / self.model.vehicles.speed_limit_mps[:, None],
+            reports[:, 1:] - reports[:, :1],
+            np.asarray(elapsed / self.steps),
+        ]
+        if not self.model.vehicles.yaw_locked:
+            blocks += [np.cos(states[..., YAW]), np.sin(states[..., YAW])]
+        return np.concatenate([block.reshape(len(states), -1) for block in blocks], axis=1)
+
+
+def rho_alpha(reports: Array) -> Array:
+    """The paper's reward: reports [E, H, V, 2] to the summed disagreement of all pairs, [E] (m)."""
+    total = np.zeros(len(reports))
+    for a, b in combinations(range(reports.shape[1]), 2):
+        total += np.linalg.norm((reports[:, a] - reports[:, b]).reshape(len(reports), -1), axis=1)
+    return total
+
+
+def nominal_actions(problem: AlphaProblem, weights: PolicyWeights) -> Array:
+    """The deterministic policy played on the nominal twin: actions [K, A]."""
+    states = problem.start[None].copy()
+    actions = []
+    for k in range(problem.steps):
+        action = act(weights, problem.observe(states, np.array([k])))
+        problem.move(problem.model.nominal, states, to_setpoints(action, problem.commands))
+        actions.append(action[0])
+    return np.array(actions)
+
+
+class AlphaTask:
+    """E environments x H twins, each environment with physical parameters of its own."""
+
+    def __init__(self, problem: AlphaProblem, environments: int, rng: np.random.Generator) -> None:
+        self.environments, self.progress = environments, 0.0
+        self.action_size = problem.commands.size
+        self._problem, self._rng = problem, rng
+        self._parameters = perturbed(problem.model, rng, environments)
+        self._states = np.empty((environments, *problem.start.shape))
+        self._elapsed = np.zeros(environments, dtype=np.int64)
+        self.observation_size = self.reset().shape[1]
+
+    def reset(self) -> Array:
+        self._begin(np.ones(self.environments, dtype=np.bool_))
+        return self._problem.observe(self._states, self._elapsed)
+
+    def step(self, actions: Array) -> Step:
+        problem = self._problem
+        setpoints = to_setpoints(actions, problem.commands)
+        walls = problem.move(self._parameters, self._states, setpoints)
+        self._elapsed += 1
+        rewards = rho_alpha(problem.reports(self._states)) * problem.period_s
+        rewards -= WALL_COST * walls.sum(axis=(1, 2))
+        if problem.rho == "printed":
+            self._states[:] = self._states[:, :1]
+        final = problem.observe(self._states, self._elapsed)
+        dones = self._elapsed >= problem.steps
+        if not dones.any():
+            return Step(final, rewards, dones, final)
+        self._begin(dones)
+        return Step(problem.observe(self._states, self._elapsed), rewards, dones, final)
+
+    def _begin(self, which: Flags) -> None:
+        """New episodes; some of them with the commanded vehicles anywhere around the suspect."""
+        problem, n = self._problem, int(which.sum())
+        states = np.repeat(problem.start[None], n, axis=0)
+        noise = START_SIGMA_M * self._rng.standard_normal((n, 1, problem.model.size, 2))
+        states[..., NORTH : EAST + 1] += noise
+        near = self._rng.random(n) < NEAR_START_SHARE * max(0.0, 1.0 - 2.0 * self.progress)
+        others = [v for v in problem.commands.commanded if v != problem.suspect]
+        centre = states[near, 0, problem.suspect, NORTH : EAST + 1]
+        places = scattered(problem.model, self._rng, centre, others, problem.suspect)
+        for v, place in zip(others, places.swapaxes(0, 1), strict=True):
+            states[near, :, v, NORTH : EAST + 1] = place[:, None]
+        self._states[which] = states
+        self._elapsed[which] = 0
