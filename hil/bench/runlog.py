@@ -1,0 +1,127 @@
+"""The log of a run: takes what the station and the world say, keeps and shows it.
+
+Both backends, UDP and memory, talk to one of these; what is scored comes from here only.
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from hil.bench.console import Console
+from hil.bench.lines import (
+    Outcome,
+    Progress,
+    ResultLine,
+    StationEvent,
+    StationLine,
+    Tick,
+    as_station_line,
+)
+from hil.faults import Unit
+from hil.scenario import FaultModel, Scenario
+from hil.world.truth import ContactEpisode, TruthRecord, contact_line, truth_line
+
+TRUTH_FILE, EVENTS_FILE = "truth.jsonl", "events.jsonl"
+
+
+@dataclass(frozen=True)
+class Struck:
+    """A fault that is in effect since `time_s` of world time."""
+
+    fault: FaultModel
+    time_s: float
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """What a run left behind; `outcome` is None when the station never concluded."""
+
+    outcome: Outcome | None
+    truth: TruthRecord | None
+    contacts: tuple[ContactEpisode, ...]
+    struck: tuple[Struck, ...]
+
+
+class RunLog:
+    """Writes events.jsonl and truth.jsonl as things happen, and feeds the console."""
+
+    def __init__(self, scenario: Scenario, folder: Path, console: Console) -> None:
+        self._scenario, self._console = scenario, console
+        self._events = (folder / EVENTS_FILE).open("w", encoding="utf-8", buffering=1)
+        self._truth_file = (folder / TRUTH_FILE).open("w", encoding="utf-8", buffering=1)
+        self._truth: TruthRecord | None = None
+        self._contacts: list[ContactEpisode] = []
+        self._struck: list[Struck] = []
+        self.outcome: Outcome | None = None
+        self.tick_s: float | None = None  # fleet time of the station's last tick
+
+    def __enter__(self) -> "RunLog":
+        return self
+
+    def __exit__(
+        self,
+        _type: type[BaseException] | None,
+        _error: BaseException | None,
+        _traceback: TracebackType | None,
+    ) -> None:
+        self._events.close()
+        self._truth_file.close()
+
+    @property
+    def world_s(self) -> float:
+        """World time as last heard; 0 before the first truth."""
+        return self._truth.time_s if self._truth else 0.0
+
+    def station(self, tree: dict[str, Any]) -> None:
+        """A line of the station as an object. Raises ProcessDiedError on a broken one."""
+        self.station_line(as_station_line(tree))
+
+    def station_line(self, line: StationLine) -> None:
+        match line:
+            case Tick():
+                self.tick_s = line.time_s
+                self._console.tick(line)
+            case StationEvent():
+                self._write_event(line)
+            case Progress():
+                self._console.progress(line)
+            case ResultLine():
+                self.outcome = line.outcome
+            case _:
+                pass
+
+    def truth(self, record: TruthRecord) -> None:
+        self._truth = record
+        self._truth_file.write(truth_line(record) + "\n")
+
+    def contact(self, episode: ContactEpisode) -> None:
+        self._contacts.append(episode)
+        self._truth_file.write(contact_line(episode) + "\n")
+
+    def struck(self, fault: FaultModel, time_s: float) -> None:
+        """The injector's orders for a fault have been confirmed."""
+        self._struck.append(Struck(fault, time_s))
+        text = describe_fault(self._scenario, fault)
+        data = fault.model_dump(mode="json", exclude={"onset"})
+        self._write_event(
+            StationEvent(type="event", time_s=round(time_s, 3), kind="fault", text=text, data=data)
+        )
+
+    def record(self) -> RunRecord:
+        """All of it, for the score."""
+        return RunRecord(self.outcome, self._truth, tuple(self._contacts), tuple(self._struck))
+
+    def _write_event(self, event: StationEvent) -> None:
+        tree = event.model_dump(mode="json", exclude={"type"})
+        self._events.write(json.dumps(tree, ensure_ascii=False) + "\n")
+        self._console.event(event)
+
+
+def describe_fault(scenario: Scenario, fault: FaultModel) -> str:
+    """As in 'rover_2: motor 3, 4 off'."""
+    what = fault.fault()
+    parts = (", ".join(map(str, what.instances)), ", ".join(what.axes))
+    part = parts[0] if what.unit is Unit.MOTOR else parts[1]
+    return f"{scenario.vehicle(fault.vehicle).name}: {fault.unit} {part or 'all'} {fault.type}"
