@@ -10,11 +10,11 @@ from base_station.hypotheses import Hypothesis
 
 Array = NDArray[np.float64]
 
-REPORT_SIGMA_M = 0.05  # declared noise after the vehicle's filter, wander and time alignment
+REPORT_SIGMA_M = 0.03  # declared noise after the vehicle's filter, wander and time alignment
 MODEL_ERROR = 0.15  # of the displacement the twin predicts: gains, rolling resistance, contact
 TAIL_DOF = 4.0  # Student's t: one bad sample must not decide
 UNKNOWN_SIGMA_M = 0.5  # 'something else': the next report is within half a metre of the last
-SAMPLE_PERIOD_S = 0.5  # longer than the vehicle filter remembers
+SAMPLE_PERIOD_S = 0.3  # about what the vehicle's filter remembers
 TEMPER = 0.5  # successive residuals share the twin's error: count each as half a sample
 
 

@@ -19,7 +19,7 @@ from base_station.watch import CORRECTION_TIME_S, Baseline, Moment, correct
 
 Array = NDArray[np.float64]
 
-FLOOR = 1e-3  # no explanation is ever ruled out by what was seen before an experiment
+FLOOR = 1e-3  # 'something else' is never ruled out before an experiment
 ONSET_STEP_S = 0.3
 MAX_ONSETS = 12
 
@@ -118,8 +118,9 @@ def anchor(doubt: Doubt, report_m: Array) -> Doubt:
 
 
 def awake(doubt: Doubt) -> Doubt:
-    """Lift every posterior to FLOOR, so that an experiment can still bring any explanation back."""
-    return replace(doubt, log_weights=np.log(np.maximum(doubt.posterior, FLOOR)))
+    """Lift 'something else' to FLOOR: a fleet at rest suits every twin better than no twin."""
+    floor = np.array([0.0 if h.has_twin else FLOOR for h in doubt.hypotheses])
+    return replace(doubt, log_weights=np.log(np.maximum(doubt.posterior, floor) + 1e-300))
 
 
 def narrowed(doubt: Doubt, keep: Sequence[int]) -> tuple[tuple[Hypothesis, ...], Array, Array]:

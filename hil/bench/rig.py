@@ -1,0 +1,122 @@
+"""World, vehicles and station in one process over in-memory links: deterministic, in lockstep.
+
+The same bytes that would go over UDP go through memory. One `tick` is one autopilot frame of every
+vehicle; the station steps at 20 Hz of simulation time. Time is simulation time throughout.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from base_station.node import Listener, StationNode
+from base_station.planning.planner import plan
+from base_station.planning.requests import PlanProgress, PlanReady, PlanRequest, decode, encode
+from hil.link import MemoryLink
+from hil.physics_link import ServoFrame, decode_state, encode_frame
+from hil.scenario import Scenario, StationView
+from hil.world.simulation import Advance, Simulation
+from sim_vehicles.vehicle import Vehicle
+
+STATION_HZ = 20
+EPOCH_US = 1_700_000_000_000_000  # telemetry logs of simulated time start here
+
+
+class InlinePlanner:
+    """Plans at once, delivers after the declared simulation time. Requests travel as JSON, too."""
+
+    def __init__(self, view: StationView) -> None:
+        self._view = view
+        self._ready: list[tuple[float, PlanReady]] = []
+        self._progress: list[PlanProgress] = []
+        self.time_s = 0.0
+
+    def submit(self, request: PlanRequest) -> None:
+        received = decode(encode(request))
+        assert isinstance(received, PlanRequest)
+        answer = decode(encode(plan(self._view, received, self._progress.append)))
+        assert isinstance(answer, PlanReady)
+        self._ready.append((self.time_s + self._view.planning.planning_sim_s, answer))
+
+    def poll(self) -> list[PlanProgress | PlanReady]:
+        due: list[PlanProgress | PlanReady] = [*self._progress]
+        self._progress.clear()
+        due += [answer for at_s, answer in self._ready if at_s <= self.time_s + 1e-9]
+        self._ready = [entry for entry in self._ready if entry[0] > self.time_s + 1e-9]
+        return due
+
+
+@dataclass
+class _Seat:
+    """A vehicle and its ends of the two links."""
+
+    vehicle: Vehicle
+    gcs: MemoryLink
+    injector: MemoryLink
+    frames: int = 0
+    outputs: tuple[int, ...] = (0,) * 16
+
+
+class Rig:
+    """A scenario in memory. `injector_links` are for whoever breaks things."""
+
+    def __init__(
+        self, scenario: Scenario, view: StationView, listeners: Sequence[Listener]
+    ) -> None:
+        self._scenario = scenario
+        self.simulation = Simulation(scenario, scenario.seed)
+        self._seats: dict[int, _Seat] = {}
+        station_links, self.injector_links = [], []
+        for v in scenario.fleet:
+            ours, theirs = MemoryLink.pair()
+            breaker, broken = MemoryLink.pair()
+            self._seats[v.sysid] = _Seat(Vehicle(scenario, v.sysid), theirs, broken)
+            station_links.append(ours)
+            self.injector_links.append(breaker)
+        self.planner = InlinePlanner(view)
+        self.node = StationNode(view, station_links, self.planner, listeners)
+        self._send_frames()
+
+    @property
+    def time_s(self) -> float:
+        return self.simulation.time_s
+
+    def serve(self) -> None:
+        """Vehicles handle what has arrived and answer: no time passes."""
+        ports: tuple[Literal["gcs", "injector"], ...] = ("gcs", "injector")
+        for seat in self._seats.values():
+            for port in ports:
+                link = seat.gcs if port == "gcs" else seat.injector
+                for datagram in link.receive():
+                    seat.vehicle.receive(port, datagram)
+                for datagram in seat.vehicle.outbox(port):
+                    link.send(datagram)
+
+    def run(self) -> Iterator[Advance]:
+        """Tick after tick for ever; the caller decides when it is enough."""
+        autopilot_hz = self._scenario.clock.autopilot_hz
+        ticks_per_step = max(1, autopilot_hz // STATION_HZ)
+        tick = 0
+        while True:
+            advance = self.simulation.advance(float("inf"), self.time_s)
+            for sysid, reply in advance.replies:
+                self._step_vehicle(self._seats[sysid], reply)
+            self.serve()
+            self._send_frames()
+            tick += 1
+            if tick % ticks_per_step == 0:
+                self.planner.time_s = self.time_s
+                self.node.step(self.time_s, EPOCH_US + round(self.time_s * 1e6))
+                self.serve()
+            yield advance
+
+    def _step_vehicle(self, seat: _Seat, reply: bytes) -> None:
+        state = decode_state(reply)
+        assert state is not None
+        seat.outputs = seat.vehicle.step(state)
+
+    def _send_frames(self) -> None:
+        hz = self._scenario.clock.autopilot_hz
+        for sysid, seat in self._seats.items():
+            frame = ServoFrame(hz, seat.frames, seat.outputs)
+            seat.frames += 1
+            self.simulation.receive(sysid, [encode_frame(frame)], self.time_s)

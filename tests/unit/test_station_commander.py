@@ -1,0 +1,63 @@
+"""Orders to commands: repeated until confirmed, silent towards a vehicle that was taken over."""
+
+from dataclasses import replace
+
+from base_station.commander import TAKEOVER_S, Commander
+from base_station.commands import Arm, Drive, SetMode
+from base_station.execution import hold
+from base_station.telemetry import Track
+from hil.mavlink import RoverMode
+from hil.scenario import StationView
+
+
+def _tracks(mode: RoverMode, count: int = 3) -> list[Track]:
+    tracks = [Track() for _ in range(count)]
+    for track in tracks:
+        track.status = replace(track.status, mode=int(mode), armed=True)
+    return tracks
+
+
+def _drive_first(count: int = 3):  # type: ignore[no-untyped-def]
+    orders = hold(count)
+    orders.driven[0] = True
+    orders.setpoints[0, :2] = (0.3, -0.2)
+    return orders
+
+
+def test_driving_asks_for_guided_and_sends_the_setpoint(rescue_view: StationView) -> None:
+    commands = Commander(rescue_view).carry_out(_drive_first(), _tracks(RoverMode.HOLD), 1.0)
+    assert commands[0] == SetMode(1, RoverMode.GUIDED)
+    assert commands[1] == Drive(1, 1.0, 0.3, -0.2, None)
+
+
+def test_a_mode_is_asked_for_again_until_it_is_confirmed(rescue_view: StationView) -> None:
+    commander, tracks = Commander(rescue_view), _tracks(RoverMode.MANUAL)
+    orders = hold(3)
+    assert len(commander.carry_out(orders, tracks, 0.0)) == 3
+    assert commander.carry_out(orders, tracks, 0.1) == []
+    assert len(commander.carry_out(orders, tracks, 0.6)) == 3
+    assert commander.carry_out(orders, _tracks(RoverMode.HOLD), 0.7) == []
+
+
+def test_a_mode_nobody_commanded_is_a_takeover_and_ends_all_commands(
+    rescue_view: StationView,
+) -> None:
+    commander, orders = Commander(rescue_view), hold(3)
+    commander.carry_out(orders, _tracks(RoverMode.HOLD), 0.0)
+    commander.carry_out(orders, _tracks(RoverMode.HOLD), 0.1)
+    strayed = _tracks(RoverMode.HOLD)
+    strayed[1].status = replace(strayed[1].status, mode=int(RoverMode.MANUAL))
+    assert commander.carry_out(orders, strayed, 1.0) == []
+    assert commander.takeovers(1.5) == []
+    assert commander.takeovers(1.0 + TAKEOVER_S) == [1]
+    commander.released.add(1)
+    commands = commander.carry_out(_drive_first(), strayed, 5.0)
+    assert {c.sysid for c in commands} == {1}
+
+
+def test_arming_is_asked_only_of_those_that_are_not_armed(rescue_view: StationView) -> None:
+    commander, tracks = Commander(rescue_view), _tracks(RoverMode.HOLD)
+    tracks[2].status = replace(tracks[2].status, armed=False)
+    assert commander.arm(tracks, 0.0) == [Arm(3)]
+    assert commander.arm(tracks, 0.2) == []
+    assert commander.arm(tracks, 0.6) == [Arm(3)]

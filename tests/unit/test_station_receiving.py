@@ -1,0 +1,77 @@
+"""Telemetry on a common time base: order, age, clocks."""
+
+import numpy as np
+import pytest
+
+from base_station.fleet import Fleet
+from base_station.fleet_clock import FleetClock
+from base_station.telemetry import Sample, Track
+from hil.mavlink import COMPONENT_AUTOPILOT, LocalPosition, Received
+from hil.scenario import StationView
+
+
+def _position(time_s: float, north_m: float) -> LocalPosition:
+    return LocalPosition(time_s, (north_m, 0.0, 0.0), (1.0, 0.0, 0.0))
+
+
+def test_late_and_doubled_packets_change_nothing() -> None:
+    track = Track()
+    for time_s, north in ((0.1, 1.0), (0.3, 3.0), (0.2, 99.0), (0.3, 99.0)):
+        track.position(Sample(time_s, (north, 0.0), (0.0, 0.0)))
+    assert [s.position_m[0] for s in track.samples] == [1.0, 3.0]
+
+
+def test_a_sample_is_carried_forward_but_not_for_long() -> None:
+    track = Track()
+    track.position(Sample(1.0, (2.0, 0.0), (0.5, 0.0)))
+    carried = track.at(1.2)
+    assert carried is not None
+    assert carried.position_m[0] == pytest.approx(2.1)
+    assert track.at(2.0) is None
+
+
+def test_a_frame_waits_for_all_vehicles_then_goes_on_without_the_late_one(
+    rescue_view: StationView,
+) -> None:
+    fleet = Fleet(rescue_view)
+
+    def hear(index: int, time_s: float) -> None:
+        sysid = rescue_view.fleet[index].sysid
+        message = Received(sysid, COMPONENT_AUTOPILOT, _position(time_s, time_s))
+        fleet.receive(index, message, wall_s=time_s)
+
+    for i in range(3):
+        hear(i, 1.0)
+    fleet.start_ticks()
+    hear(0, 1.1)
+    hear(1, 1.1)
+    assert fleet.due() == []
+    hear(2, 1.1)
+    (frame,) = fleet.due()
+    assert frame.time_s == pytest.approx(1.1)
+    assert frame.fresh.all()
+    for k in range(2, 8):
+        hear(0, 1.0 + 0.1 * k)
+        hear(1, 1.0 + 0.1 * k)
+    late = fleet.due()
+    assert [round(f.time_s, 1) for f in late] == [1.2, 1.3, 1.4]
+    assert late[-1].fresh[2]  # carried forward 0.3 s
+    assert np.isfinite(late[-1].position_m).all()
+
+
+def test_a_message_from_a_stranger_on_the_link_is_ignored(rescue_view: StationView) -> None:
+    fleet = Fleet(rescue_view)
+    fleet.receive(0, Received(77, COMPONENT_AUTOPILOT, _position(1.0, 5.0)), wall_s=0.0)
+    assert not fleet.tracks[0].samples
+
+
+def test_boot_clocks_that_differ_are_brought_together() -> None:
+    clock = FleetClock((1, 2))
+    for k in range(30):
+        asked_ns = k * 1_000_000_000
+        jitter_ns = (7 * k % 5) * 20_000_000
+        clock.reply(1, 5_000_000_000 + asked_ns, asked_ns, asked_ns + 1_000_000)
+        delayed_ns = asked_ns + jitter_ns
+        clock.reply(2, 9_000_000_000 + delayed_ns, asked_ns, delayed_ns + 1_000_000)
+    assert clock.fleet_time_s(1, 5.0) == pytest.approx(5.0)
+    assert clock.fleet_time_s(2, 9.0) == pytest.approx(5.0, abs=1e-3)
