@@ -12,6 +12,7 @@ from hil.mavlink.enums import (
 from hil.mavlink.message import (
     Message,
     Vector,
+    clip,
     finite,
     heading_cdeg,
     int16,
@@ -127,7 +128,19 @@ class GpsRaw(Message):
         motion = (uint16(self.speed_mps * 1e2), heading_cdeg(self.course_rad))
         quality = (uint16(self.hdop * 1e2), UNKNOWN_U16)
         fix = (self.fix_type, self.satellites)
-        return (round(self.time_s * 1e6), *where, *quality, *motion, *fix, 0, 0, 0, 0, 0, 0)
+        return (
+            clip(self.time_s * 1e6, 0, 2**64 - 1),
+            *where,
+            *quality,
+            *motion,
+            *fix,
+            0,
+            0,
+            0,
+            0,
+            0,
+            0,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,7 +218,10 @@ class Attitude(Message):
 
 @dataclass(frozen=True, slots=True)
 class ServoOutputs(Message):
-    """SERVO_OUTPUT_RAW: 16 outputs as the autopilot commands them, in us; 0 is no pulse."""
+    """SERVO_OUTPUT_RAW: 16 outputs as the autopilot commands them, in us; 0 is no pulse.
+
+    The time field has 32 bits of microseconds: it wraps after 71 minutes.
+    """
 
     ID = MessageId.SERVO_OUTPUT_RAW
     time_s: float
