@@ -85,7 +85,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    scenario = argparse.ArgumentParser(add_help=False)
+    scenario = _Parser(add_help=False)
     scenario.add_argument("scenario", type=Path, metavar="SCENARIO", help="a YAML file")
     scenario.add_argument(
         "--set",
@@ -94,7 +94,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="KEY.PATH=VALUE",
         help="override one value of the scenario; may be given more than once",
     )
-    timed = argparse.ArgumentParser(add_help=False)
+    timed = _Parser(add_help=False)
     timed.add_argument("--seed", type=int, help="instead of the scenario's")
     timed.add_argument(
         "--speed",

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from hil.airframe import push_margin
 from hil.bench.onsets import Onsets
-from hil.bench.runlog import describe_fault
+from hil.bench.record import describe_fault
 from hil.errors import InputError
 from hil.faults import Unit
 from hil.scenario import MIN_PUSH_MARGIN, FaultModel, Scenario, Vehicle

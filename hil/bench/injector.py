@@ -6,10 +6,10 @@ go first, then commands, one at a time, each sent again until it is echoed or ac
 
 import math
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from hil.errors import InputError
+from hil.errors import InputError, ProcessDiedError
 from hil.faults import to_injection
 from hil.mavlink import (
     COMPONENT_GCS,
@@ -22,9 +22,10 @@ from hil.mavlink import (
     Received,
     Result,
 )
-from hil.scenario import FaultModel
+from hil.scenario import FaultModel, Scenario
 
 RESEND_S = 0.5
+ANSWER_WITHIN_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,7 @@ class Injector:
         self._encoder = Encoder(sysid, COMPONENT_GCS)
         self._decoder = Decoder()
         self._orders: deque[Order] = deque()
+        self._asked_s: float | None = None  # when the first order was first sent
         self._sent_s = -math.inf
 
     @property
@@ -99,13 +101,18 @@ class Injector:
         self._orders += [InjectFailure(*numbers) for numbers in injection.commands]
 
     def step(self, now_s: float, datagrams: Iterable[bytes]) -> list[bytes]:
-        """Datagrams to send. Raises InputError when the vehicle refuses."""
+        """Datagrams to send. Raises as `Breaker.step`."""
         for datagram in datagrams:
             for received in self._decoder.decode(datagram):
                 self._take(received)
         if not self._orders or now_s - self._sent_s < RESEND_S:
             return []
         self._sent_s = now_s
+        self._asked_s = now_s if self._asked_s is None else self._asked_s
+        if now_s - self._asked_s > ANSWER_WITHIN_S:
+            raise ProcessDiedError(
+                f"{self.name} does not answer on its injector port for {ANSWER_WITHIN_S:.0f} s"
+            )
         return [self._orders[0].datagram(self._encoder, self.target)]
 
     def _take(self, received: Received) -> None:
@@ -119,4 +126,41 @@ class Injector:
             )
         if order.answered_by(value):
             self._orders.popleft()
-            self._sent_s = -math.inf  # the next one goes at once
+            self._asked_s, self._sent_s = None, -math.inf  # the next one goes at once
+
+
+class Breaker:
+    """Makes faults happen, over one injector per vehicle, and reports those in effect.
+
+    `report` gets each fault once its last order has been confirmed.
+    """
+
+    def __init__(self, scenario: Scenario, report: Callable[[FaultModel], None]) -> None:
+        sysid = scenario.links.injector_sysid
+        self._injectors = {v.sysid: Injector(v.name, v.sysid, sysid) for v in scenario.fleet}
+        self._waiting: dict[int, list[FaultModel]] = {v.sysid: [] for v in scenario.fleet}
+        self._report = report
+
+    @property
+    def done(self) -> bool:
+        """Every fault asked for is in effect."""
+        return not any(self._waiting.values())
+
+    def strike(self, faults: Iterable[FaultModel]) -> None:
+        """Ask for faults, from the next step on."""
+        for fault in faults:
+            self._injectors[fault.vehicle].add(fault)
+            self._waiting[fault.vehicle].append(fault)
+
+    def step(self, now_s: float, sysid: int, datagrams: Iterable[bytes]) -> list[bytes]:
+        """What has come from a vehicle's injector port; returns what goes there.
+
+        Raises InputError when it refuses, ProcessDiedError when it does not answer for 10 s.
+        """
+        injector = self._injectors[sysid]
+        outgoing = injector.step(now_s, datagrams)
+        if injector.done:
+            done, self._waiting[sysid] = self._waiting[sysid], []
+            for fault in done:
+                self._report(fault)
+        return outgoing

@@ -9,11 +9,11 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from hil.errors import ProcessDiedError
+from hil.errors import HilError, ProcessDiedError
 
 STOP_WITHIN_S = 3.0
 _PR_SET_PDEATHSIG = 1
@@ -121,6 +121,7 @@ class Children:
         self._on_line = on_line
         self._children: list[Child] = []
         self._selector = selectors.DefaultSelector()
+        self._stopping = False
 
     def __enter__(self) -> "Children":
         return self
@@ -167,6 +168,7 @@ class Children:
 
     def stop(self) -> None:
         """SIGTERM, SIGKILL after 3 s, and SIGKILL for whatever they have started themselves."""
+        self._stopping = True
         for child in self._children:
             child.may_end = True
             if child.process.poll() is None:
@@ -193,7 +195,8 @@ class Children:
             self._selector.unregister(child.stdout)
         for line in lines:
             child.ready = child.ready or _is_ready(line)
-            self._on_line(child.name, line)
+            with suppress(HilError) if self._stopping else nullcontext():
+                self._on_line(child.name, line)
 
 
 def _is_ready(line: str) -> bool:

@@ -8,11 +8,12 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from hil.bench.runlog import RunRecord
+from hil.bench.record import RunRecord
 from hil.bench.score import Score
 from hil.scenario import Scenario
 
 RESULT_FILE = "result.json"
+COMPLETED = "completed"
 _PACKAGES = (
     "hil-fleet",
     "numpy",
@@ -40,7 +41,7 @@ def result_tree(
 ) -> dict[str, Any]:
     """The result as plain JSON values.
 
-    `ended` is 'completed', or why the run did not get that far; then `score` is None.
+    `ended` is COMPLETED, or why the run did not get that far; then `score` is None.
     """
     outcome = run.outcome
     return {

@@ -4,7 +4,6 @@ Both backends, UDP and memory, talk to one of these; what is scored comes from h
 """
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -19,29 +18,11 @@ from hil.bench.lines import (
     Tick,
     as_station_line,
 )
-from hil.faults import Unit
+from hil.bench.record import RunRecord, Struck, describe_fault
 from hil.scenario import FaultModel, Scenario
 from hil.world.truth import ContactEpisode, TruthRecord, contact_line, truth_line
 
 TRUTH_FILE, EVENTS_FILE = "truth.jsonl", "events.jsonl"
-
-
-@dataclass(frozen=True)
-class Struck:
-    """A fault that is in effect since `time_s` of world time."""
-
-    fault: FaultModel
-    time_s: float
-
-
-@dataclass(frozen=True)
-class RunRecord:
-    """What a run left behind; `outcome` is None when the station never concluded."""
-
-    outcome: Outcome | None
-    truth: TruthRecord | None
-    contacts: tuple[ContactEpisode, ...]
-    struck: tuple[Struck, ...]
 
 
 class RunLog:
@@ -117,11 +98,3 @@ class RunLog:
         tree = event.model_dump(mode="json", exclude={"type"})
         self._events.write(json.dumps(tree, ensure_ascii=False) + "\n")
         self._console.event(event)
-
-
-def describe_fault(scenario: Scenario, fault: FaultModel) -> str:
-    """As in 'rover_2: motor 3, 4 off'."""
-    what = fault.fault()
-    parts = (", ".join(map(str, what.instances)), ", ".join(what.axes))
-    part = parts[0] if what.unit is Unit.MOTOR else parts[1]
-    return f"{scenario.vehicle(fault.vehicle).name}: {fault.unit} {part or 'all'} {fault.type}"

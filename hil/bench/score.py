@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from base_station.hypotheses import NONE, UNKNOWN, candidates
 from hil.bench.lines import Outcome, Verdict
-from hil.bench.runlog import RunRecord, Struck
+from hil.bench.record import RunRecord, Struck
 from hil.faults import Fault, Type, Unit
 from hil.scenario import GoalOutcome, Scenario, station_view
 from hil.world.truth import TruthRecord

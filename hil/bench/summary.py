@@ -7,6 +7,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from hil.bench.result import COMPLETED
 from hil.scenario import Scenario
 
 WIDTH = 100
@@ -14,20 +15,21 @@ WIDTH = 100
 
 def summary(tree: dict[str, Any], scenario: Scenario) -> RenderableType:
     """Verdict and truth on top, goals and phases side by side below."""
+    if tree["ended"] != COMPLETED:
+        return _panel("ended early", "red", Text(tree["ended"]))
     names = {str(v.sysid): v.name for v in scenario.fleet}
     below = Table.grid(padding=(0, 4))
     below.add_row(_goals(tree, names), _times(tree))
-    parts: list[RenderableType] = [_verdict(tree, names)]
-    if tree["goals"]:
-        parts += [Text(), below]
-    met = tree["expected_met"]
-    return Panel(
-        Group(*parts, *_unmet(tree)),
-        title=Text("as expected" if met else "not as expected", style="bold"),
-        title_align="left",
-        border_style="green" if met else "red",
-        width=WIDTH,
-    )
+    parts: list[RenderableType] = [_verdict(tree, names), Text(), below]
+    if tree["expected_met"]:
+        return _panel("as expected", "green", *parts)
+    reasons = (Text(f"- {reason}", style="red") for reason in tree["unmet"])
+    return _panel("not as expected", "red", *parts, Text(), *reasons)
+
+
+def _panel(title: str, colour: str, *parts: RenderableType) -> Panel:
+    words = Text(title, style="bold")
+    return Panel(Group(*parts), title=words, title_align="left", border_style=colour, width=WIDTH)
 
 
 def _verdict(tree: dict[str, Any], names: dict[str, str]) -> RenderableType:
@@ -90,9 +92,3 @@ def _table(first: str, *columns: tuple[str, Any]) -> Table:
     for name, justify in columns:
         table.add_column(name, justify=justify)
     return table
-
-
-def _unmet(tree: dict[str, Any]) -> list[RenderableType]:
-    if not tree["unmet"]:
-        return []
-    return [Text(), *(Text(f"- {reason}", style="red") for reason in tree["unmet"])]

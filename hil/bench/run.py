@@ -1,0 +1,127 @@
+"""`hil run`: prepare, let a backend run the scenario, score, and say how it went."""
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import FrameType
+
+from hil.bench.console import Console
+from hil.bench.folders import (
+    Folders,
+    choose_folders,
+    collect,
+    create_folders,
+    pin_ports,
+    write_inputs,
+)
+from hil.bench.onsets import Onsets
+from hil.bench.ports import choose_ports
+from hil.bench.record import RunRecord
+from hil.bench.recording import merge_recordings
+from hil.bench.result import COMPLETED, result_tree, write_result
+from hil.bench.runlog import RunLog
+from hil.bench.score import score
+from hil.bench.udp import Programs, UdpOptions, run_over_udp
+from hil.errors import EXIT_AS_EXPECTED, EXIT_NOT_AS_EXPECTED, HilError
+from hil.scenario import Scenario
+
+
+class Interrupted(HilError):  # noqa: N818 - said by a person, not an error
+    """SIGINT or SIGTERM: everything is stopped, files are kept. Exit code 128 + signal."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"interrupted by {signal.Signals(number).name}; files are kept")
+        self.exit_code = 128 + number
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """As on the command line; `out` None is runs/<scenario>-<timestamp>."""
+
+    out: Path | None = None
+    speed: float = 1.0
+    in_memory: bool = False
+    viewer: bool = False
+    programs: Programs = field(default_factory=Programs)
+
+
+def run(scenario: Scenario, options: RunOptions, console: Console | None = None) -> int:
+    """Returns 0 when the scenario's expectation was met, else 1.
+
+    Raises InputError before anything is created or started, ProcessDiedError when a process dies
+    or hangs, and Interrupted; what has been recorded by then is kept.
+    """
+    onsets = Onsets(scenario)
+    folders = choose_folders(scenario, options.out)
+    if not options.in_memory:
+        scenario = pin_ports(scenario, choose_ports(scenario))
+    with _interruptible(), console or Console() as shown:
+        create_folders(folders)
+        write_inputs(scenario, folders)
+        shown.begin(scenario, folders.run, _how(options))
+        failure: HilError | None = None
+        with RunLog(scenario, folders.run, shown) as log:
+            try:
+                _backend(scenario, folders, options, log, onsets)
+            except HilError as error:
+                failure = error
+        met = _conclude(scenario, folders, log.record(), failure, shown)
+    if failure is not None:
+        raise failure
+    return EXIT_AS_EXPECTED if met else EXIT_NOT_AS_EXPECTED
+
+
+def _backend(
+    scenario: Scenario, folders: Folders, options: RunOptions, log: RunLog, onsets: Onsets
+) -> None:
+    if options.in_memory:
+        from hil.bench.memory import run_in_memory  # learns in this process: imports torch
+
+        run_in_memory(scenario, scenario.seed, folders.station, log)
+        return
+    udp = UdpOptions(options.speed, options.viewer, options.programs)
+    run_over_udp(scenario, folders, udp, log, onsets)
+
+
+def _conclude(
+    scenario: Scenario,
+    folders: Folders,
+    record: RunRecord,
+    failure: HilError | None,
+    console: Console,
+) -> bool:
+    """Collect, merge, score, write and show; returns whether all was as expected."""
+    collect(folders)
+    recording = merge_recordings(folders.run)
+    scored = score(scenario, record) if failure is None else None
+    tree = result_tree(scenario, record, scored, COMPLETED if failure is None else str(failure))
+    write_result(folders.run, tree)
+    console.end(tree, scenario, recording)
+    return scored is not None and scored.expected_met
+
+
+def _how(options: RunOptions) -> str:
+    if options.in_memory:
+        return "in memory"
+    if options.speed == 0.0:
+        return "as fast as the station keeps up"
+    return "real time" if options.speed == 1.0 else f"{options.speed:g} x real time"
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """The first SIGINT or SIGTERM raises Interrupted; later ones do not disturb the stopping."""
+
+    def raise_once(number: int, _frame: FrameType | None) -> None:
+        for n in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(n, signal.SIG_IGN)
+        raise Interrupted(number)
+
+    before = {n: signal.signal(n, raise_once) for n in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
