@@ -1,0 +1,105 @@
+"""Whatever arrives, a vehicle goes on as if it had not, and still answers."""
+
+import math
+from pathlib import Path
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from vehicle_harness import Harness
+
+from hil.mavlink import CommandAck, Encoder, LocalSetpoint, MessageId, RoverMode
+from hil.scenario import load_scenario
+
+SCENARIO = load_scenario(Path(__file__).parents[2] / "scenarios" / "rescue.yaml")
+STATION = Encoder(250, 190)
+COMMANDS = [STATION.arm(2, False), STATION.set_mode(2, 4), STATION.velocity_setpoint(2, 0, 1, 1, 0)]
+NOT_NUMBERS = st.sampled_from([math.nan, math.inf, -math.inf, 1e30, -3e38])
+
+
+def driven(*noise: bytes) -> tuple[tuple[int, ...], list[bytes]]:
+    """Outputs and telemetry of a drive, with `noise` received in the middle of it."""
+    rover = Harness(SCENARIO)
+    rover.guided()
+    rover.run(0.2, (0.3, 0.2))
+    for datagram in noise:
+        rover.vehicle.receive("gcs", datagram)
+        rover.vehicle.receive("injector", datagram)
+    rover.run(0.2)
+    rover.run(0.1, (0.3, 0.2))
+    return rover.pwm, rover.datagrams["gcs"]
+
+
+UNDISTURBED = driven()
+
+
+def test_good_frames_do_change_something() -> None:
+    assert all(driven(command) != UNDISTURBED for command in COMMANDS)
+
+
+@settings(max_examples=40)
+@given(st.lists(st.binary(max_size=300), max_size=4))
+def test_random_bytes_change_nothing(datagrams: list[bytes]) -> None:
+    assert driven(*datagrams) == UNDISTURBED
+
+
+@settings(max_examples=40)
+@given(st.sampled_from(COMMANDS), st.data())
+def test_truncated_and_broken_frames_change_nothing(frame: bytes, data: st.DataObject) -> None:
+    cut = frame[: data.draw(st.integers(0, len(frame) - 1))]
+    at = data.draw(st.integers(len(frame) - 2, len(frame) - 1))
+    wrong = frame[:at] + bytes([frame[at] ^ data.draw(st.integers(1, 255))]) + frame[at + 1 :]
+    signed = wrong[:2] + b"\1" + wrong[3:] + bytes(13)
+    assert driven(cut, wrong, signed) == UNDISTURBED
+
+
+@settings(max_examples=20)
+@given(st.integers(1, 255).filter(lambda n: n != 2), st.sampled_from([0, 1]))
+def test_frames_for_other_systems_change_nothing(target: int, kind: int) -> None:
+    other = (STATION.arm(target, False), STATION.set_mode_message(target, RoverMode.HOLD))[kind]
+    assert driven(other) == UNDISTURBED
+
+
+@settings(max_examples=40)
+@given(NOT_NUMBERS, st.integers(0, 3), st.sampled_from([1, 7, 8, 9]))
+def test_set_points_that_are_no_numbers_or_absurd_are_refused(
+    bad: float, field: int, frame: int
+) -> None:
+    place = (bad, 0.0, 0.0)
+    values = [(place, None, None, None), (None, place, None, None)]
+    values += [(None, (0.1, 0.1, 0.0), bad, None), (None, (0.1, 0.1, 0.0), None, bad)]
+    position, velocity, yaw, rate = values[field]
+    mask = (7 if position is None else 0) | (56 if velocity is None else 0)
+    mask |= (1024 if yaw is None else 0) | (2048 if rate is None else 0) | 448
+    setpoint = LocalSetpoint(2, 1, 0.0, frame, mask, position, velocity, yaw, rate)
+    assert driven(STATION.encode(setpoint)) == UNDISTURBED
+
+
+@settings(max_examples=20)
+@given(st.integers(0, 255).filter(lambda f: f not in (1, 7, 8, 9)))
+def test_unknown_frames_are_refused(frame: int) -> None:
+    setpoint = LocalSetpoint(2, 1, 0.0, frame, 3527, None, (0.5, 0.5, 0.0), None, None)
+    assert driven(STATION.encode(setpoint)) == UNDISTURBED
+
+
+def test_a_flood_of_heartbeats_changes_nothing() -> None:
+    assert driven(*[STATION.gcs_heartbeat()] * 5000) == UNDISTURBED
+
+
+@settings(max_examples=60)
+@given(
+    st.integers(0, 65535),
+    st.lists(st.floats(width=32), min_size=7, max_size=7),
+    st.sampled_from(["gcs", "injector"]),
+)
+def test_any_command_gets_one_ack_and_the_vehicle_goes_on(
+    number: int, params: list[float], port: str
+) -> None:
+    rover = Harness(SCENARIO)
+    rover.run(0.1)
+    assert port in ("gcs", "injector")
+    command = STATION.command_long(2, number, *params)
+    answers = rover.tell(command, "gcs" if port == "gcs" else "injector")
+    assert [r.value.command for r in answers if isinstance(r.value, CommandAck)] == [number]
+    rover.run(0.1)
+    answers = rover.tell(STATION.request_message(2, MessageId.AUTOPILOT_VERSION))
+    assert len(answers) == 2
