@@ -1,0 +1,80 @@
+"""The recorder: hears what the station tells and shows it in Rerun. It only listens.
+
+It never raises into the station and never waits for a viewer: the file is written at once, a
+viewer is fed by a thread that drops what it cannot deliver.
+"""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from base_station.planning.requests import PlanProgress, PlanReady, Training
+from base_station.recording import streams
+from base_station.recording.blueprint import blueprint
+from base_station.recording.outlets import Channel, Inline, Queued
+from base_station.recording.writer import Writer
+from base_station.records import Event, Snapshot
+from hil.scenario import StationView
+
+
+class Recorder:
+    """Writes `path` and, where asked and one answers, feeds a viewer.
+
+    `viewer` is True for a viewer on this machine, or its address as host:port. Recordings of one
+    `run_id` are one recording, whoever writes them.
+    """
+
+    def __init__(
+        self, path: Path, run_id: str, view: StationView, viewer: bool | str = False
+    ) -> None:
+        self._channels = [Channel(Inline(), partial(_file_writer, path, run_id, view))]
+        if viewer:
+            address = streams.VIEWER if viewer is True else viewer
+            self._channels.append(Channel(Queued(), partial(_viewer_writer, address, run_id, view)))
+
+    @property
+    def failures(self) -> int:
+        """Calls that went wrong so far; each was swallowed."""
+        return sum(c.outlet.failures for c in self._channels)
+
+    def snapshot(self, snapshot: Snapshot) -> None:
+        self._tell(lambda writer: writer.snapshot(snapshot))
+
+    def event(self, event: Event) -> None:
+        self._tell(lambda writer: writer.event(event))
+
+    def progress(self, progress: PlanProgress) -> None:
+        self._tell(lambda writer: writer.progress(progress))
+
+    def training(self, training: Training) -> None:
+        self._tell(lambda writer: writer.training(training))
+
+    def plan(self, answer: PlanReady) -> None:
+        self._tell(lambda writer: writer.plan(answer))
+
+    def datagram(self, index: int, time_us: int, datagram: bytes) -> None:
+        """Telemetry logs hold these."""
+
+    def result(self, outcome: Mapping[str, Any]) -> None:
+        """The events have told it already."""
+
+    def close(self) -> None:
+        """Everything is in the file afterwards. May be called twice."""
+        channels, self._channels = self._channels, []
+        for channel in channels:
+            channel.close()
+
+    def _tell(self, call: Callable[[Writer], None]) -> None:
+        for channel in self._channels:
+            channel.tell(call)
+
+
+def _file_writer(path: Path, run_id: str, view: StationView) -> Writer:
+    stream = streams.to_file(path, run_id, blueprint(view))
+    return Writer(stream, run_id, view, streams.FILE_PERIOD_S)
+
+
+def _viewer_writer(address: str, run_id: str, view: StationView) -> Writer | None:
+    stream = streams.to_viewer(address, run_id, blueprint(view))
+    return stream and Writer(stream, run_id, view, streams.VIEWER_PERIOD_S)

@@ -1,0 +1,1 @@
+"""Recordings for Rerun; the only place that imports it."""

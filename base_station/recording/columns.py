@@ -1,0 +1,90 @@
+"""Rows kept back for a moment and sent as columns: about a tenth of the cost of logging each."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from numpy.typing import ArrayLike, NDArray
+
+SIM_TIME, WALL_TIME, TRAINING_STEPS = "sim_time", "wall_time", "training_steps"
+MAX_TICKS = 50  # kept back at most, however fast the simulation runs
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What an instance of `width` numbers becomes; `build` takes [k, width]."""
+
+    width: int
+    build: Callable[[NDArray[np.float64]], Any]
+
+
+def _poses(flat: NDArray[np.float64]) -> Any:
+    half_rad = -0.5 * flat[:, 2]
+    zero = np.zeros(len(flat))
+    return rr.Transform3D.columns(
+        translation=np.column_stack((flat[:, :2], zero)),
+        quaternion=np.column_stack((zero, zero, np.sin(half_rad), np.cos(half_rad))),
+    )
+
+
+SCALARS = Kind(1, lambda flat: rr.Scalars.columns(scalars=flat[:, 0]))
+POSES = Kind(3, _poses)  # east m, north m, yaw rad (clockwise from north)
+SEGMENTS = Kind(6, lambda flat: rr.LineStrips3D.columns(strips=flat.reshape(-1, 2, 3)))
+ARROWS = Kind(6, lambda flat: rr.Arrows3D.columns(origins=flat[:, :3], vectors=flat[:, 3:]))
+POINTS = Kind(3, lambda flat: rr.Points3D.columns(positions=flat))
+DISCS = Kind(3, lambda flat: rr.Cylinders3D.columns(centers=flat))
+ELLIPSES = Kind(
+    6, lambda flat: rr.Ellipsoids3D.columns(centers=flat[:, :3], half_sizes=flat[:, 3:])
+)
+GEO_POINTS = Kind(2, lambda flat: rr.GeoPoints.columns(positions=flat))  # degrees
+
+
+class Batch:
+    """Collects rows tick by tick; sends them at least every `period_s` of wall time."""
+
+    def __init__(self, stream: Any, period_s: float) -> None:
+        self._stream, self._period_s = stream, period_s
+        self._sim_s: list[float] = []
+        self._wall_s: list[float] = []
+        self._rows: dict[tuple[str, Kind], tuple[list[int], list[NDArray[np.float64]]]] = {}
+
+    def tick(self, time_s: float) -> None:
+        """Rows added from here on belong to `time_s` (sim_time, s)."""
+        now_s = time.time()
+        if self._wall_s and (
+            len(self._wall_s) >= MAX_TICKS or not 0 <= now_s - self._wall_s[0] < self._period_s
+        ):
+            self.send()
+        self._sim_s.append(time_s)
+        self._wall_s.append(now_s)
+
+    def add(self, path: str, kind: Kind, row: ArrayLike) -> None:
+        """One row for this tick: one instance or several; none clears what was there."""
+        ticks, rows = self._rows.setdefault((path, kind), ([], []))
+        ticks.append(len(self._sim_s) - 1)
+        rows.append(np.asarray(row, dtype=np.float64).reshape(-1, kind.width))
+
+    def send(self) -> None:
+        """Hand everything over to the stream."""
+        indexes: dict[tuple[int, ...], list[Any]] = {}
+        for (path, kind), (ticks, rows) in self._rows.items():
+            key = tuple(ticks)
+            if key not in indexes:
+                indexes[key] = self._index(ticks)
+            columns = kind.build(np.concatenate(rows))
+            lengths = [len(row) for row in rows]
+            if set(lengths) != {1}:
+                columns = columns.partition(lengths)
+            self._stream.send_columns(path, indexes=indexes[key], columns=columns)
+        self._rows.clear()
+        self._sim_s.clear()
+        self._wall_s.clear()
+
+    def _index(self, ticks: list[int]) -> list[Any]:
+        return [
+            rr.TimeColumn(SIM_TIME, duration=[self._sim_s[i] for i in ticks]),
+            rr.TimeColumn(WALL_TIME, timestamp=[self._wall_s[i] for i in ticks]),
+        ]

@@ -1,0 +1,94 @@
+"""How calls reach a writer: at once, or through a queue; neither raises, neither waits."""
+
+import logging
+import queue
+import threading
+from collections.abc import Callable
+from typing import Generic, Protocol, TypeVar
+
+from base_station.recording import streams
+
+LEAVE_S = 2.0
+QUEUE_LENGTH = 500
+
+Call = Callable[[], object]
+log = logging.getLogger(__name__)
+
+
+class Inline:
+    """Runs calls at once. The first failure is logged; `failures` counts them."""
+
+    def __init__(self) -> None:
+        self.failures = 0
+
+    def put(self, call: Call) -> None:
+        try:
+            call()
+        except Exception:
+            self.failures += 1
+            if self.failures == 1:
+                log.warning("the recorder failed; the run goes on", exc_info=True)
+
+    def close(self) -> bool:
+        return True
+
+
+class Queued:
+    """Runs calls one after the other in a thread of its own, and drops them when it is behind."""
+
+    def __init__(self) -> None:
+        self.dropped = 0
+        self._inline = Inline()
+        self._calls: queue.Queue[Call | None] = queue.Queue(QUEUE_LENGTH)
+        self._thread = threading.Thread(target=self._run, daemon=True, name="recorder")
+        self._thread.start()
+
+    @property
+    def failures(self) -> int:
+        return self._inline.failures
+
+    def put(self, call: Call) -> None:
+        try:
+            self._calls.put_nowait(call)
+        except queue.Full:
+            self.dropped += 1
+
+    def close(self) -> bool:
+        """Let it finish; False when it did not within `LEAVE_S`."""
+        try:
+            self._calls.put(None, timeout=LEAVE_S)
+        except queue.Full:
+            return False
+        self._thread.join(LEAVE_S)
+        return not self._thread.is_alive()
+
+    def _run(self) -> None:
+        while (call := self._calls.get()) is not None:
+            self._inline.put(call)
+
+
+class Closable(Protocol):
+    def close(self) -> None: ...
+
+
+W = TypeVar("W", bound=Closable)
+
+
+class Channel(Generic[W]):
+    """A writer and the way to it. The writer is made where its calls run."""
+
+    def __init__(self, outlet: Inline | Queued, make: Callable[[], W | None]) -> None:
+        self.outlet, self._make = outlet, make
+        self._writer: W | None = None
+        outlet.put(self._open)
+
+    def tell(self, call: Callable[[W], None]) -> None:
+        self.outlet.put(lambda: self._writer and call(self._writer))
+
+    def close(self) -> None:
+        self.tell(lambda writer: writer.close())
+        if not self.outlet.close():
+            streams.abandon()
+
+    def _open(self) -> None:
+        self._writer = self._make()
