@@ -64,3 +64,18 @@ def test_masked_fields_are_none_and_may_be_anything() -> None:
     assert received.value.velocity_mps == (0.5, 0.25, 0.0)
     assert received.value.position_m is None
     assert (received.value.yaw_rad, received.value.yaw_rate_radps) == (None, None)
+
+
+@pytest.mark.parametrize("field", range(4))
+def test_a_field_that_is_used_must_be_a_number(field: int) -> None:
+    numbers = [0.0, 0.0, 0.0, 0.0]
+    numbers[field] = math.nan
+    north, east, yaw, rate = numbers
+    for place in (0, 3):  # position, velocity
+        values = [0.0] * 9
+        values[place : place + 2] = [north, east]
+        mask = 56 if place == 0 else 7
+        message = reference.MAVLink_set_position_target_local_ned_message(
+            0, 2, 1, 1, mask | 448, *values, yaw, rate
+        )
+        assert Decoder().decode(message.pack(reference.MAVLink(None))) == []

@@ -6,10 +6,12 @@ from vehicle_harness import Harness
 from hil.mavlink import (
     Command,
     CommandAck,
+    MessageId,
     ParamFailed,
     ParamRequestRead,
     ParamValue,
     Result,
+    ServoOutputs,
     StatusText,
 )
 from hil.scenario import Scenario
@@ -40,6 +42,17 @@ def interviewed(scenario: Scenario, injections: list[tuple[int, int, int]]) -> l
 @pytest.mark.parametrize("fault", FAULTS)
 def test_every_byte_is_the_same_with_and_without_a_fault(rescue: Scenario, fault: str) -> None:
     assert interviewed(rescue, FAULTS[fault]) == interviewed(rescue, [])
+
+
+def test_outputs_asked_for_between_steps_are_those_before_the_fault(rescue: Scenario) -> None:
+    rover = Harness(rescue)
+    rover.inject(101, 1, 0)
+    rover.guided()
+    rover.run(1.0, (0.5, 0.5))
+    assert rover.pwm == (0,) * 16
+    rover.tell(rover.station.request_message(2, MessageId.SERVO_OUTPUT_RAW))
+    (outputs,) = rover.values(ServoOutputs)
+    assert min(outputs.pwm_us[:4]) > 1600
 
 
 def test_injection_does_not_exist_on_the_stations_port(rescue: Scenario) -> None:

@@ -43,7 +43,7 @@ def test_a_body_frame_set_point_is_turned_with_the_heading(rescue: Scenario, fra
 
 def test_an_offset_counts_from_where_the_rover_is(rover: Harness) -> None:
     rover.position_m = [1.0, 1.0]
-    rover.run(1.0)
+    rover.run(5.0)
     ahead = LocalSetpoint(2, 1, 0.0, 7, 3576, (1.0, -1.0, 0.0), None, None, None)
     rover.tell(rover.station.encode(ahead))
     rover.run(12.0)
@@ -64,7 +64,8 @@ def test_silence_of_the_station_holds_it(rover: Harness) -> None:
     rover.run(7.0, (0.5, 0.0), beats=False)
     assert rover.pwm == (0,) * 16
     assert rover.values(Heartbeat)[-1].custom_mode == RoverMode.HOLD
-    assert "GCS Failsafe: Hold" in [t.text for t in rover.values(StatusText)]
+    for port in ("gcs", "injector"):
+        assert "GCS Failsafe: Hold" in [t.text for t in rover.values(StatusText, port)]
 
 
 def test_the_failsafe_can_be_switched_off(rover: Harness) -> None:
@@ -78,6 +79,16 @@ def test_hold_sets_the_wheels_free(rover: Harness) -> None:
     rover.tell(rover.station.set_mode(2, RoverMode.HOLD))
     rover.run(0.02)
     assert rover.pwm == (0,) * 16
+
+
+def test_hold_between_two_steps_still_resets_the_integrators(rover: Harness) -> None:
+    rover.inject(MOTOR, OFF, 0)
+    rover.run(2.0, (0.5, 0.0))  # it can't move, so the integrator is at its limit
+    rover.tell(rover.station.set_mode(2, RoverMode.HOLD))
+    rover.tell(rover.station.set_mode(2, RoverMode.GUIDED))
+    rover.inject(MOTOR, OK, 0)
+    rover.run(0.02)
+    assert rover.pwm[0] == pytest.approx(1500, abs=3)
 
 
 def test_a_broken_motor_is_silent(rover: Harness) -> None:

@@ -163,6 +163,13 @@ def test_the_old_way_to_set_rates(rover: Harness) -> None:
     assert len(rover.values(LocalPosition)) in (4, 5)
 
 
+def test_the_old_way_to_stop_streams_leaves_the_heartbeat(rover: Harness) -> None:
+    rover.tell(rover.station.encode(RequestDataStream(2, 1, 0, 4, False)))
+    rover.run(2.0)
+    assert not rover.values(LocalPosition)
+    assert len(rover.values(Heartbeat)) == 2
+
+
 def test_parameters_list_read_and_set(rover: Harness) -> None:
     rover.tell(rover.station.param_request_list(2))
     listed = rover.values(ParamValue)
