@@ -1,0 +1,81 @@
+"""`hil check`: margins, and rescues that cannot work."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from bench_builders import RESCUE, rescue
+
+from hil.airframe import OMNI_PLUS, push_margin
+from hil.bench.check import describe, margin, refuse_hopeless
+from hil.cli import main
+from hil.errors import InputError
+from hil.scenario import MIN_PUSH_MARGIN, Scenario
+
+
+def alone(**changes: object) -> Scenario:
+    """Rover 2 of the rescue with nobody to push it."""
+    tree = rescue().model_dump()
+    tree["fleet"] = [tree["fleet"][1]]
+    tree["expect"] = {"goals": {2: ["reached"]}}
+    return Scenario.model_validate(tree | changes)
+
+
+def test_the_margin_adds_up_over_the_pushers() -> None:
+    scenario = rescue()
+    pushed = scenario.vehicle(2)
+    assert margin(scenario, pushed, "y") == pytest.approx(push_margin(OMNI_PLUS, 2, OMNI_PLUS))
+    assert margin(scenario, pushed, "y") >= MIN_PUSH_MARGIN
+
+
+def test_fleet_faults_and_margins_are_shown() -> None:
+    text = describe(rescue())
+    for words in ("rover_2: motor 3, 4 off, at 0 s", "push margin", "body y", "omni_plus"):
+        assert words in text
+
+
+def test_a_rescue_nobody_can_give_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "alone.yaml"
+    path.write_text(yaml.safe_dump(alone().model_dump(mode="json", exclude_none=True)))
+    assert main(["check", str(path)]) == 2
+    line = capsys.readouterr().err
+    assert "rover_2 cannot be rescued: the push margin along body y is 0.00" in line
+    assert line.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        alone(yaw="free"),
+        alone(expect={}),
+        alone(expect={"goals": {2: ["uncertain", "unreached"]}}),
+        alone(faults=[{"vehicle": 2, "unit": "motor", "type": "off", "instances": [3]}]),
+        alone(faults=[{"vehicle": 2, "unit": "gps", "type": "stuck"}]),
+    ],
+    ids=["can turn", "no expectation", "not expected", "half a pair", "gps"],
+)
+def test_what_is_no_rescue_passes(scenario: Scenario) -> None:
+    refuse_hopeless(Path("x.yaml"), scenario)
+
+
+def test_an_unreadable_onset_is_refused() -> None:
+    fault = {"vehicle": 2, "unit": "motor", "type": "off", "onset": {"when": "rover_2.north_m > ."}}
+    tree = rescue().model_dump() | {"faults": [fault]}
+    with pytest.raises(InputError, match=r"onset\.when"):
+        describe(Scenario.model_validate(tree))
+
+
+def test_the_command_line_imports_nothing_heavy() -> None:
+    code = (
+        "import sys; from hil.cli import main; code = main(['check', sys.argv[1]]); "
+        "heavy = {'torch', 'stable_baselines3', 'rerun', 'pymunk', 'numba'} & set(sys.modules); "
+        "sys.exit(f'imported {heavy}' if heavy else code)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(RESCUE)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
