@@ -1,19 +1,21 @@
 """Is something wrong? A residual test per vehicle and axis against the twin that is believed.
 
 Two one-sided CUSUMs (Page 1954) on the normalised innovation. For white unit noise the mean time
-between false alarms of one side follows Siegmund's approximation (1985, eq. 2.57); the threshold
-is solved from the false-alarm rate asked for, shared out over all sides.
+between false alarms of one side comes from a Markov chain (Brook and Evans 1972); the threshold is
+solved from the false-alarm rate asked for, shared out over all sides.
 """
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-DRIFT = 1.0  # sigma per sample; half of the smallest shift that is worth an alarm (2 sigma)
+CHAIN_STATES = 80
+DRIFT = 1.5  # sigma per sample; half of the smallest shift that is worth an alarm (3 sigma)
 
 
 @dataclass(frozen=True)
@@ -46,17 +48,29 @@ def update(cusum: Cusum, residual: Array, time_s: float) -> Cusum:
 
 
 def mean_time_to_false_alarm(threshold: float) -> float:
-    """Samples between false alarms of one side, white unit noise (Siegmund 1985)."""
-    b = threshold + 1.166
-    return (math.exp(2 * DRIFT * b) - 2 * DRIFT * b - 1) / (2 * DRIFT**2)
+    """Samples between false alarms of one side, white unit noise (Brook and Evans 1972).
+
+    The statistic is cut into CHAIN_STATES cells; with R the transitions that stay below the
+    threshold, the mean run length from zero is the first entry of (I - R)^-1 1.
+    """
+    width = threshold / (CHAIN_STATES - 0.5)  # the first cell is half as wide: around zero
+    middle = width * np.arange(CHAIN_STATES)
+    upper = _normal_cdf(middle[None, :] + width / 2 - middle[:, None] + DRIFT)
+    stay = np.diff(upper, axis=1, prepend=0.0)
+    return float(np.linalg.solve(np.eye(CHAIN_STATES) - stay, np.ones(CHAIN_STATES))[0])
 
 
+def _normal_cdf(x: Array) -> Array:
+    return np.asarray(0.5 * np.vectorize(math.erfc)(-x / math.sqrt(2.0)))
+
+
+@lru_cache
 def threshold(false_alarms_per_hour: float, sample_hz: float, vehicles: int) -> float:
     """The CUSUM level whose alarms, of all vehicles, axes and signs together, are this rare."""
     sides = vehicles * 2 * 2
     wanted = sides * sample_hz * 3600.0 / false_alarms_per_hour
-    low, high = 0.0, 50.0
-    for _ in range(60):
+    low, high = 0.0, 20.0
+    for _ in range(30):
         middle = (low + high) / 2
         if mean_time_to_false_alarm(middle) < wanted:
             low = middle

@@ -5,15 +5,15 @@ are seen, and never drawn towards the suspect's own reports: those are what is b
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from base_station import diagnosis, twin
-from base_station.diagnosis import Verdict
+from base_station.diagnosis import Fit, Verdict
 from base_station.execution import Orders
-from base_station.hypotheses import Hypothesis
+from base_station.hypotheses import NONE, Hypothesis
 from base_station.telemetry import Frame
 from base_station.watch import CORRECTION_TIME_S, Baseline, Moment, correct
 
@@ -21,23 +21,24 @@ Array = NDArray[np.float64]
 
 FLOOR = 1e-3  # 'something else' is never ruled out before an experiment
 ONSET_STEP_S = 0.3
-MAX_ONSETS = 12
+MAX_ONSETS = 20
+ONSET_MARGIN_S = 1.0  # a fault may have been there before the statistic moved
 
 
 @dataclass(frozen=True, eq=False)
 class Doubt:
-    """`states` [T, V, S], `log_weights` [H], `anchor_m` [T, 2]; the T that have a twin come first.
+    """`prior` [H] are log weights before `fit` and `unknown` began; T of the H have a twin, first.
 
-    `anchor_m` is what each twin expected of the suspect's report when it was last still;
-    `last_report_m` the report judged last, at `judged_s`.
+    `states` [T, V, S]; `last_report_m` [2] is the report judged last, at `judged_s`.
     """
 
     baseline: Baseline
     suspect: int
     hypotheses: tuple[Hypothesis, ...]
-    log_weights: Array
+    prior: Array
     states: Array
-    anchor_m: Array
+    fit: Fit
+    unknown: float
     last_report_m: Array
     judged_s: float
 
@@ -48,6 +49,12 @@ class Doubt:
     @property
     def faults(self) -> twin.FaultArrays:
         return self.baseline.faults(self.twins)
+
+    @property
+    def log_weights(self) -> Array:
+        """[H], not normalised."""
+        beyond = [self.unknown] * (len(self.hypotheses) - len(self.twins))
+        return np.asarray(self.prior + np.array([*self.fit.log_likelihood, *beyond]))
 
     @property
     def posterior(self) -> Array:
@@ -62,7 +69,7 @@ class Doubt:
     @property
     def sigma_m(self) -> Array:
         """[T, 2]: spread of what each twin expects of the suspect."""
-        return diagnosis.report_sigma_m(self.report_m[:, self.suspect] - self.anchor_m)
+        return self.fit.sigma_m
 
     def verdict(self, decide_at: float) -> Verdict:
         return diagnosis.decide(self.hypotheses, self.log_weights, decide_at)
@@ -70,29 +77,7 @@ class Doubt:
 
 def tick(doubt: Doubt, frame: Frame, orders: Orders, period_s: float) -> Doubt:
     """Move every twin on by one telemetry period, and judge the suspect's report when it is due."""
-    states = _move(
-        doubt.baseline, doubt.faults, doubt.states, doubt.suspect, frame, orders, period_s
-    )
-    doubt = replace(doubt, states=states)
-    due = frame.time_s - doubt.judged_s >= diagnosis.SAMPLE_PERIOD_S - 1e-6
-    if not (due and frame.fresh[doubt.suspect]):
-        return doubt
-    observed = frame.position_m[doubt.suspect]
-    predicted = doubt.report_m[:, doubt.suspect]
-    gained = [
-        *diagnosis.twin_log_likelihood(observed, predicted, predicted - doubt.anchor_m),
-        *(
-            diagnosis.unknown_log_likelihood(observed, doubt.last_report_m)
-            for h in doubt.hypotheses
-            if not h.has_twin
-        ),
-    ]
-    return replace(
-        doubt,
-        log_weights=doubt.log_weights + np.array(gained),
-        last_report_m=observed,
-        judged_s=frame.time_s,
-    )
+    return _advanced(doubt, doubt.faults, frame, orders, period_s)
 
 
 def anchor(doubt: Doubt, report_m: Array) -> Doubt:
@@ -109,10 +94,12 @@ def anchor(doubt: Doubt, report_m: Array) -> Doubt:
     held[...] = np.where(stuck, report_m, held)
     for column in (twin.V_NORTH, twin.V_EAST, twin.YAW_RATE, twin.I_X, twin.I_Y):
         states[..., column] = 0.0
-    doubt = replace(doubt, states=states)
     return replace(
         doubt,
-        anchor_m=doubt.report_m[:, doubt.suspect],
+        prior=np.log(doubt.posterior + 1e-300),
+        states=states,
+        fit=diagnosis.fresh_fit(len(doubt.twins)),
+        unknown=0.0,
         last_report_m=report_m[doubt.suspect],
     )
 
@@ -120,7 +107,8 @@ def anchor(doubt: Doubt, report_m: Array) -> Doubt:
 def awake(doubt: Doubt) -> Doubt:
     """Lift 'something else' to FLOOR: a fleet at rest suits every twin better than no twin."""
     floor = np.array([0.0 if h.has_twin else FLOOR for h in doubt.hypotheses])
-    return replace(doubt, log_weights=np.log(np.maximum(doubt.posterior, floor) + 1e-300))
+    weights = np.log(np.maximum(doubt.posterior, floor) + 1e-300)
+    return replace(doubt, prior=weights + doubt.prior - doubt.log_weights)
 
 
 def narrowed(doubt: Doubt, keep: Sequence[int]) -> tuple[tuple[Hypothesis, ...], Array, Array]:
@@ -134,35 +122,38 @@ def open_doubt(
     memory: Sequence[Moment],
     suspect: int,
     candidates: Sequence[Hypothesis],
-    healthy_until_s: float,
+    between_s: tuple[float, float],
     period_s: float,
 ) -> Doubt:
     """Replay the memory from the last healthy moment under every candidate.
 
-    When exactly the fault struck is unknown: each hypothesis is replayed for several onsets from
-    then to the end of the memory, and its evidence is the mean of their likelihoods.
+    When exactly the fault struck is unknown, somewhere in `between_s` (last quiet, alarm): each
+    hypothesis is replayed for several onsets, and its evidence is the mean of their likelihoods.
     """
     hypotheses = tuple(sorted(candidates, key=lambda h: not h.has_twin))
-    times = np.array([m.frame.time_s for m in memory])
-    first = max(0, int(np.searchsorted(times, healthy_until_s)) - 1)
-    replayed = memory[first:]
-    onsets = _onsets(times[first], times[-1])
     twins = tuple(h for h in hypotheses if h.has_twin)
-    count = len(twins)
+    start_s = between_s[0] - ONSET_MARGIN_S
+    times = np.array([m.frame.time_s for m in memory])
+    first, *replayed = memory[max(0, int(np.searchsorted(times, start_s)) - 1) :]
+    onsets = _onsets(first.frame.time_s, between_s[1])
     struck = baseline.faults(twins * len(onsets))
-    sound = baseline.faults([Hypothesis("none", h.sysid, 1.0) for h in twins * len(onsets)])
-    onset_of_row = np.repeat(onsets, count)
-
-    states = np.repeat(replayed[0].state[None], len(onset_of_row), axis=0)
-    start_m = np.asarray(replayed[0].frame.position_m[suspect], dtype=np.float64)
-    anchor_m = np.repeat(twin.report(states, sound)[:, suspect], 1, axis=0)
-    rows = np.zeros(len(onset_of_row))
-    unknown, last_m, judged_s = 0.0, start_m, replayed[0].frame.time_s
+    sound = baseline.faults([Hypothesis(NONE, h.sysid, 1.0) for h in twins * len(onsets)])
+    onset_of_row = np.repeat(onsets, len(twins))
+    rows = Doubt(
+        baseline=baseline,
+        suspect=suspect,
+        hypotheses=twins * len(onsets),
+        prior=np.zeros(len(onset_of_row)),
+        states=np.repeat(first.state[None], len(onset_of_row), axis=0),
+        fit=diagnosis.fresh_fit(len(onset_of_row)),
+        unknown=0.0,
+        last_report_m=np.asarray(first.frame.position_m[suspect]),
+        judged_s=first.frame.time_s,
+    )
     active = np.zeros(len(onset_of_row), dtype=np.bool_)
-    for moment in replayed[1:]:
-        frame = moment.frame
-        strikes = ~active & (frame.time_s - period_s >= onset_of_row - 1e-6)
-        states[strikes, suspect, twin.HELD_NORTH : twin.HELD_EAST + 1] = states[
+    for moment in replayed:
+        strikes = ~active & (moment.frame.time_s - period_s >= onset_of_row - 1e-6)
+        rows.states[strikes, suspect, twin.HELD_NORTH : twin.HELD_EAST + 1] = rows.states[
             strikes, suspect, twin.NORTH : twin.EAST + 1
         ]
         active |= strikes
@@ -170,34 +161,45 @@ def open_doubt(
             np.where(active[:, None, None], struck.power, sound.power),
             np.where(active[:, None, None], struck.gps_stuck, sound.gps_stuck),
         )
-        states = _move(baseline, faults, states, suspect, frame, moment.orders, period_s)
-        if frame.time_s - judged_s >= diagnosis.SAMPLE_PERIOD_S - 1e-6 and frame.fresh[suspect]:
-            observed = frame.position_m[suspect]
-            predicted = twin.report(states, faults)[:, suspect]
-            rows += diagnosis.twin_log_likelihood(observed, predicted, predicted - anchor_m)
-            unknown += diagnosis.unknown_log_likelihood(observed, last_m)
-            last_m, judged_s = observed, frame.time_s
-    by_onset = rows.reshape(len(onsets), count)
-    best = by_onset.argmax(axis=0)
-    evidence = _log_mean_exp(by_onset)
-    priors = np.log([h.prior for h in hypotheses])
-    gained = [*evidence, *(unknown for h in hypotheses if not h.has_twin)]
-    chosen = best * count + np.arange(count)
-    return Doubt(
-        baseline,
-        suspect,
-        hypotheses,
-        priors + gained,
-        states[chosen],
-        anchor_m[chosen],
-        last_m,
-        judged_s,
+        rows = _advanced(rows, faults, moment.frame, moment.orders, period_s)
+    by_onset = rows.fit.log_likelihood.reshape(len(onsets), len(twins))
+    chosen = by_onset.argmax(axis=0) * len(twins) + np.arange(len(twins))
+    fit = Fit(*(getattr(rows.fit, f.name)[chosen] for f in fields(Fit)))
+    return replace(
+        rows,
+        hypotheses=hypotheses,
+        prior=np.log([h.prior for h in hypotheses]),
+        states=rows.states[chosen],
+        fit=replace(fit, log_likelihood=_log_mean_exp(by_onset)),
     )
 
 
 def _onsets(first_s: float, last_s: float) -> Array:
-    count = int(np.clip((last_s - first_s) / ONSET_STEP_S, 1, MAX_ONSETS))
-    return first_s + ONSET_STEP_S * np.arange(count)
+    count = int(np.clip((last_s - first_s) / ONSET_STEP_S + 1, 1, MAX_ONSETS))
+    return np.linspace(first_s, last_s, count)
+
+
+def _advanced(
+    doubt: Doubt, faults: twin.FaultArrays, frame: Frame, orders: Orders, period_s: float
+) -> Doubt:
+    suspect = doubt.suspect
+    before_m = twin.report(doubt.states, faults)[:, suspect]
+    states = _move(doubt.baseline, faults, doubt.states, suspect, frame, orders, period_s)
+    predicted_m = twin.report(states, faults)[:, suspect]
+    fit = replace(doubt.fit, path_m=doubt.fit.path_m + np.abs(predicted_m - before_m))
+    due = frame.time_s - doubt.judged_s >= diagnosis.SAMPLE_PERIOD_S - 1e-6
+    if not (due and frame.fresh[suspect]):
+        return replace(doubt, states=states, fit=fit)
+    observed_m = frame.position_m[suspect]
+    gained = diagnosis.unknown_log_likelihood(observed_m, doubt.last_report_m)
+    return replace(
+        doubt,
+        states=states,
+        fit=diagnosis.judge(fit, observed_m, predicted_m),
+        unknown=doubt.unknown + gained,
+        last_report_m=observed_m,
+        judged_s=frame.time_s,
+    )
 
 
 def _move(

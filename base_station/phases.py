@@ -31,7 +31,7 @@ class Settling:
 
     since_s: float
     suspect: int
-    healthy_until_s: float
+    struck_between_s: tuple[float, float]  # last quiet moment, alarm
     name: Phase = "probe"
 
 

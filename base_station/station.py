@@ -84,7 +84,7 @@ class Station:
         self._tries = 0
         self._mission_plans = 0
         self._mission_since_s: float | None = None
-        self._alarmed: dict[int, float] = {}  # vehicle: healthy until (s)
+        self._alarmed: dict[int, tuple[float, float]] = {}  # vehicle: last quiet, alarm (s)
         self._beats_s = (float("-inf"), float("-inf"))  # last heartbeat: wall, fleet
         self._asked_time_s = float("-inf")
         self._events: list[Event] = []
@@ -194,7 +194,7 @@ class Station:
             if i in self._alarmed or self.ended:
                 continue
             self.alarm = True
-            self._alarmed[i] = float(self.watch.cusum.quiet_since_s[i])
+            self._alarmed[i] = (float(self.watch.cusum.quiet_since_s[i]), self.time_s)
             axis = int(self.watch.cusum.level[i].argmax())
             north_east = ("north", "east")[axis]
             member = self.view.fleet[i]
@@ -264,7 +264,7 @@ class Station:
             tuple(self.watch.memory),
             phase.suspect,
             candidates(member, self.view.diagnosis.priors),
-            phase.healthy_until_s,
+            phase.struck_between_s,
             self.fleet.period_s,
         )
         self.doubt = doubts.anchor(opened, self._mean_report())

@@ -22,7 +22,9 @@ Array = NDArray[np.float64]
 
 CORRECTION_TIME_S = 1.0  # how fast the twin follows what is received
 NOISE_SIGMA_M = 0.03  # of one report after the vehicle's filter
-SPEED_ERROR = 0.10  # of the twin's speed: gains, rolling resistance, latency
+MOTION_ERROR = (
+    0.30  # of the motion the twin expects: one sigma of rolling resistance is 18 % of a pulse
+)
 CONTACT_GAP_M = 0.15  # closer than this two vehicles may be touching ...
 CONTACT_SIGMA_M = 0.30  # ... and how they slide off each other is beyond the twin
 MEMORY_S = 60.0
@@ -87,6 +89,7 @@ class Watch:
         self._trusted = self._faults.gps_stuck < 0.5
         self._period_s = 1.0 / view.clock.telemetry_hz
         self.state = state
+        self._motion_sigma_m = np.zeros((len(view.fleet), 2))  # builds up and fades like the error
         self.travelled_m = [0.0] * len(view.fleet)  # by the twin, since this belief began
         self.threshold = detection.threshold(
             view.diagnosis.false_alarms_per_hour, view.clock.telemetry_hz, len(view.fleet)
@@ -104,8 +107,7 @@ class Watch:
     @property
     def sigma_m(self) -> Array:
         """[V, 2]: one standard deviation of the residual before it is normalised."""
-        speed = np.abs(self.state[:, twin.V_NORTH : twin.V_EAST + 1])
-        sigma = np.hypot(NOISE_SIGMA_M, SPEED_ERROR * speed * CORRECTION_TIME_S)
+        sigma = np.hypot(NOISE_SIGMA_M, self._motion_sigma_m)
         touching = near_contact(
             self.state[:, twin.NORTH : twin.EAST + 1], self.baseline.model.vehicles.radius_m
         )
@@ -127,12 +129,13 @@ class Watch:
         )
         before, self.state = self.state, moved.states[0]
         steps = (self.state - before)[:, twin.NORTH : twin.EAST + 1]
+        gain = self._period_s / CORRECTION_TIME_S
+        self._motion_sigma_m = (1.0 - gain) * self._motion_sigma_m + MOTION_ERROR * np.abs(steps)
         self.travelled_m = [
             m + float(np.hypot(*d)) for m, d in zip(self.travelled_m, steps, strict=True)
         ]
         self.residual = (frame.position_m - self.report_m) / self.sigma_m
         self.cusum = detection.update(self.cusum, self.residual, frame.time_s)
-        gain = self._period_s / CORRECTION_TIME_S
         self.state = correct(moved.states, frame, self._trusted, gain)[0]
         self.memory.append(Moment(frame, orders, self.state))
         return tuple(int(v) for v in np.flatnonzero(self.cusum.level.max(axis=1) > self.threshold))

@@ -68,7 +68,7 @@ def _open(view: StationView, watch: Watch) -> doubts.Doubt:
         tuple(watch.memory),
         SUSPECT,
         candidates(view.fleet[SUSPECT], view.diagnosis.priors),
-        0.5,
+        (2.0, 12.0),
         PERIOD_S,
     )
 
