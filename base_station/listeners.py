@@ -2,10 +2,13 @@
 
 import json
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from base_station.node import Listener
 from base_station.planning.requests import PlanProgress, PlanReady
+from base_station.recorder import Recorder
 from base_station.records import Event, Snapshot
 from base_station.tlog import TlogWriter
 from hil.scenario import StationView
@@ -86,3 +89,23 @@ class EventLog(Silent):
 
     def close(self) -> None:
         self._file.close()
+
+
+def open_listeners(
+    stack: ExitStack,
+    folder: Path,
+    run_id: str,
+    view: StationView,
+    viewer: bool,
+    say: Callable[[dict[str, Any]], None],
+) -> list[Listener]:
+    """Everything that listens to a station: telemetry logs, events, recording, lines.
+
+    They write into `folder` and are closed by `stack`.
+    """
+    logs = TelemetryLogs(folder, view)
+    events = EventLog(folder / "events.jsonl")
+    recorder = Recorder(folder / "station.rrd", run_id, view, viewer=viewer)
+    for listener in (logs, events, recorder):
+        stack.callback(listener.close)
+    return [logs, events, recorder, Lines(say)]

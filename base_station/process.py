@@ -16,10 +16,9 @@ import numpy as np
 
 from base_station import twin
 from base_station.execution import hold
-from base_station.listeners import EventLog, Lines, TelemetryLogs
+from base_station.listeners import open_listeners
 from base_station.node import StationNode
 from base_station.planner_child import PlannerChild
-from base_station.recorder import Recorder
 from base_station.telemetry import Frame
 from base_station.watch import Baseline, Watch
 from hil.errors import HilError, InputError
@@ -77,14 +76,9 @@ def run(arguments: argparse.Namespace) -> None:
             stack.callback(link.close)
         planner = PlannerChild(arguments.view, arguments.out / "planner.log")
         stack.callback(planner.close)
-        logs = TelemetryLogs(arguments.out, view)
-        stack.callback(logs.close)
-        events = EventLog(arguments.out / "events.jsonl")
-        stack.callback(events.close)
-        recorder = Recorder(arguments.out / "station.rrd", run_id, view, viewer=arguments.viewer)
-        stack.callback(recorder.close)
+        listeners = open_listeners(stack, arguments.out, run_id, view, arguments.viewer, say)
         _compile_twin(view)
-        node = StationNode(view, links, planner, [logs, events, recorder, Lines(say)])
+        node = StationNode(view, links, planner, listeners)
         say({"type": "ready", "planner_pid": planner.pid})
         while not node.finished:
             select.select([*(link.fileno() for link in links), planner.fileno()], [], [], STEP_S)

@@ -49,6 +49,7 @@ HEARTBEAT_S = 1.0
 TIMESYNC_S = 1.0
 REST_S = 1.5  # a rover at the speed limit coasts to rest in 1 s
 EXPERIMENT_MIN_S = 1.0
+CONTACT_GAP_S = 1.0  # two touches of a pair closer in time than this are one
 PLANNABLE_POSTERIOR = 0.005  # explanations less likely than this are not worth a contact
 MAX_MISSION_PLANS = 4
 RETURN_TIMEOUT_S = 40.0
@@ -83,8 +84,9 @@ class Station:
         self._requests = 0
         self._tries = 0
         self._mission_plans = 0
-        self._mission_since_s: float | None = None
+        self._mission_s = 0.0  # on the way, planning not counted
         self._alarmed: dict[int, tuple[float, float]] = {}  # vehicle: last quiet, alarm (s)
+        self._touched_s: dict[tuple[int, int], float] = {}
         self._beats_s = (float("-inf"), float("-inf"))  # last heartbeat: wall, fleet
         self._asked_time_s = float("-inf")
         self._events: list[Event] = []
@@ -143,7 +145,8 @@ class Station:
             wall_s - self._beats_s[0] >= HEARTBEAT_S
             or self.time_s - self._beats_s[1] >= HEARTBEAT_S
         ):
-            self._beats_s = (wall_s, self.time_s)
+            self._touched_s: dict[tuple[int, int], float] = {}
+        self._beats_s = (wall_s, self.time_s)
             commands += [Heartbeat(m.sysid) for m in self.view.fleet]
         if wall_s - self._asked_time_s >= TIMESYNC_S:
             self._asked_time_s = wall_s
@@ -179,14 +182,28 @@ class Station:
             self.doubt = doubts.tick(self.doubt, frame, self.orders, self.fleet.period_s)
         else:
             self._take_alarms(alarms)
+        self._note_contacts(frame)
         for i in self.commander.takeovers(frame.time_s):
             self.commander.released.add(i)
             self._say(
                 "takeover", f"{self.view.fleet[i].name} was taken over: not commanded any more"
             )
             self._stop("takeover")
+        if isinstance(self.phase, OnMission | Returning):
+            self._mission_s += self.fleet.period_s
+            if self._mission_s > self.view.limits.mission_timeout_s:
+                self._stop(f"mission not done after {self._mission_s:.0f} s")
         self.orders = self._decide(frame)
         return self.commander.carry_out(self.orders, self.fleet.tracks, frame.time_s)
+
+    def _note_contacts(self, frame: Frame) -> None:
+        """A contact is what the believed twin makes of it: no rover here can feel one."""
+        assert self.watch is not None
+        for pair in self.watch.contacts:
+            if frame.time_s - self._touched_s.get(pair, float("-inf")) > CONTACT_GAP_S:
+                a, b = (self.view.fleet[i] for i in pair)
+                self._say("contact", f"{a.name} touches {b.name}", sysids=[a.sysid, b.sysid])
+            self._touched_s[pair] = frame.time_s
 
     def _take_alarms(self, alarms: Sequence[int]) -> None:
         assert self.watch is not None
@@ -398,8 +415,6 @@ class Station:
         if answer is not None and answer.policy is None:
             self._stop("no mission plan found")
         elif answer is not None and answer.policy is not None:
-            if self._mission_since_s is None:
-                self._mission_since_s = frame.time_s
             self._say("plan", "plan beta learnt")
             self._enter(OnMission(answer.policy, frame.time_s, self._hold(), frame.time_s))
         return self._hold()

@@ -19,7 +19,7 @@ from hil.bench.folders import (
 from hil.bench.onsets import Onsets
 from hil.bench.ports import choose_ports
 from hil.bench.record import RunRecord
-from hil.bench.recording import merge_recordings
+from hil.bench.recording import RecordedTruth, merge_recordings, open_viewer
 from hil.bench.result import COMPLETED, result_tree, write_result
 from hil.bench.runlog import RunLog
 from hil.bench.score import score
@@ -62,7 +62,9 @@ def run(scenario: Scenario, options: RunOptions, console: Console | None = None)
         write_inputs(scenario, folders)
         shown.begin(scenario, folders.run, _how(options))
         failure: HilError | None = None
-        with RunLog(scenario, folders.run, shown) as log:
+        viewer = options.viewer and open_viewer()
+        truth = RecordedTruth(folders, scenario, viewer)
+        with RunLog(scenario, folders.run, shown, truth) as log:
             try:
                 _backend(scenario, folders, options, log, onsets)
             except HilError as error:
@@ -79,7 +81,7 @@ def _backend(
     if options.in_memory:
         from hil.bench.memory import run_in_memory  # learns in this process: imports torch
 
-        run_in_memory(scenario, scenario.seed, folders.station, log)
+        run_in_memory(scenario, folders.station, folders.run_id, options.viewer, log, onsets)
         return
     udp = UdpOptions(options.speed, options.viewer, options.programs)
     run_over_udp(scenario, folders, udp, log, onsets)
