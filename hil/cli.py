@@ -3,6 +3,7 @@
 import argparse
 import json
 import math
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +11,8 @@ from typing import NoReturn
 
 from hil.errors import HilError, InputError
 from hil.scenario import Scenario, load_scenario
+
+EXIT_BROKEN_PIPE = 128 + 13  # as a process that SIGPIPE ended
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -20,6 +23,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except HilError as error:
         print(f"hil: {error}", file=sys.stderr)
         code = error.exit_code
+    except BrokenPipeError:  # as in `hil schema | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = EXIT_BROKEN_PIPE
     assert isinstance(code, int)
     return code
 

@@ -1,49 +1,98 @@
-"""The recording of a run: the truth beside what the station recorded, merged into one file."""
+"""The recording of a run: the truth beside what the station recorded, in one file.
 
+Rerun itself is used in `base_station.recording` only, and imported when it is needed.
+"""
+
+import socket
 import subprocess
 import sys
-from collections.abc import Iterable
+import time
 from pathlib import Path
+from typing import Protocol
 
-RERUN = (sys.executable, "-m", "rerun")
+from hil.bench.folders import Folders
+from hil.scenario import Scenario
+from hil.world.truth import ContactEpisode, TruthRecord
+
 STATION_RECORDING, TRUTH_RECORDING, RECORDING = "station.rrd", "truth.rrd", "mission.rrd"
-MERGE_WITHIN_S = 120.0
+VIEWER_WITHIN_S = 15.0
+
+
+class TruthObserver(Protocol):
+    """Who shows the truth."""
+
+    def truth(self, record: TruthRecord) -> None: ...
+
+    def contact(self, episode: ContactEpisode) -> None: ...
+
+    def fault(self, time_s: float, text: str) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class RecordedTruth:
+    """Hands the truth to the recorder, in the recording that the station writes, too."""
+
+    def __init__(self, folders: Folders, scenario: Scenario, viewer: bool) -> None:
+        from base_station.recording.truth import TruthRecorder
+
+        path = folders.run / TRUTH_RECORDING
+        self._recorder = TruthRecorder(path, folders.run_id, scenario, viewer)
+
+    def truth(self, record: TruthRecord) -> None:
+        poses = {s: (v.north_m, v.east_m, v.yaw_rad) for s, v in record.vehicles.items()}
+        self._recorder.truth(record.time_s, poses)
+
+    def contact(self, episode: ContactEpisode) -> None:
+        peak_ns = episode.peak_impulse_ns
+        self._recorder.contact(episode.start_s, episode.bodies, episode.point_m, peak_ns)
+
+    def fault(self, time_s: float, text: str) -> None:
+        self._recorder.fault(time_s, text)
+
+    def close(self) -> None:
+        self._recorder.close()
 
 
 def merge_recordings(folder: Path) -> Path | None:
-    """One mission.rrd out of the parts there are; None when there are none.
+    """One mission.rrd out of the parts there are, which go; None when nothing was recorded."""
+    from base_station.recording.merge import merge
 
-    The parts go once they are merged. One that was cut off by SIGKILL is taken as far as it reads.
-    """
-    parts = [p for p in (folder / STATION_RECORDING, folder / TRUTH_RECORDING) if _holds_data(p)]
-    target = folder / RECORDING
-    if not parts:
+    parts, target = [folder / STATION_RECORDING, folder / TRUTH_RECORDING], folder / RECORDING
+    try:
+        merge(parts, target)
+    except FileNotFoundError:
         return target if target.exists() else None
-    if len(parts) > 1 and not _merged(parts, target):
-        parts[0].replace(target)
-        return target
-    if len(parts) == 1:
-        parts[0].replace(target)
-        return target
     for part in parts:
-        part.unlink()
+        part.unlink(missing_ok=True)
     return target
 
 
-def _holds_data(path: Path) -> bool:
-    return path.exists() and path.stat().st_size > 0
+def open_viewer() -> bool:
+    """Start a Rerun viewer unless one runs; whether one listens. It stays after the run."""
+    from base_station.recording.streams import VIEWER
+
+    if _listens(VIEWER):
+        return True
+    subprocess.Popen(
+        [sys.executable, "-m", "rerun", "--bind", "127.0.0.1", "--port", VIEWER.split(":")[1]],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    deadline_s = time.monotonic() + VIEWER_WITHIN_S
+    while time.monotonic() < deadline_s:
+        if _listens(VIEWER):
+            return True
+        time.sleep(0.1)
+    return False
 
 
-def _merged(parts: Iterable[Path], target: Path) -> bool:
-    command = [*RERUN, "rrd", "merge", "--continue-on-error", *map(str, parts), "-o", str(target)]
+def _listens(address: str) -> bool:
+    host, port = address.split(":")
     try:
-        done = subprocess.run(
-            command,
-            capture_output=True,
-            timeout=MERGE_WITHIN_S,
-            check=False,
-            stdin=subprocess.DEVNULL,
-        )
-    except subprocess.TimeoutExpired:
+        socket.create_connection((host, int(port)), timeout=0.3).close()
+    except OSError:
         return False
-    return done.returncode == 0 and _holds_data(target)
+    return True

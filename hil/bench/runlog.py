@@ -19,6 +19,7 @@ from hil.bench.lines import (
     as_station_line,
 )
 from hil.bench.record import RunRecord, Struck, describe_fault
+from hil.bench.recording import TruthObserver
 from hil.scenario import FaultModel, Scenario
 from hil.world.truth import ContactEpisode, TruthRecord, contact_line, truth_line
 
@@ -28,8 +29,10 @@ TRUTH_FILE, EVENTS_FILE = "truth.jsonl", "events.jsonl"
 class RunLog:
     """Writes events.jsonl and truth.jsonl as things happen, and feeds the console."""
 
-    def __init__(self, scenario: Scenario, folder: Path, console: Console) -> None:
-        self._scenario, self._console = scenario, console
+    def __init__(
+        self, scenario: Scenario, folder: Path, console: Console, observer: TruthObserver | None
+    ) -> None:
+        self._scenario, self._console, self._observer = scenario, console, observer
         self._events = (folder / EVENTS_FILE).open("w", encoding="utf-8", buffering=1)
         self._truth_file = (folder / TRUTH_FILE).open("w", encoding="utf-8", buffering=1)
         self._truth: TruthRecord | None = None
@@ -49,6 +52,8 @@ class RunLog:
     ) -> None:
         self._events.close()
         self._truth_file.close()
+        if self._observer:
+            self._observer.close()
 
     @property
     def world_s(self) -> float:
@@ -76,16 +81,22 @@ class RunLog:
     def truth(self, record: TruthRecord) -> None:
         self._truth = record
         self._truth_file.write(truth_line(record) + "\n")
+        if self._observer:
+            self._observer.truth(record)
 
     def contact(self, episode: ContactEpisode) -> None:
         self._contacts.append(episode)
         self._truth_file.write(contact_line(episode) + "\n")
+        if self._observer:
+            self._observer.contact(episode)
 
     def struck(self, fault: FaultModel, time_s: float) -> None:
         """The injector's orders for a fault have been confirmed."""
         self._struck.append(Struck(fault, time_s))
         text = describe_fault(self._scenario, fault)
         data = fault.model_dump(mode="json", exclude={"onset"})
+        if self._observer:
+            self._observer.fault(time_s, text)
         self._write_event(
             StationEvent(type="event", time_s=round(time_s, 3), kind="fault", text=text, data=data)
         )

@@ -113,8 +113,10 @@ class World:
     def _touched(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
         first, second = sorted(self._names[shape] for shape in arbiter.shapes)
         impulse_ns = arbiter.total_impulse.length
-        if impulse_ns > 0.0:
-            self._contacts.append(Contact(self.time_s, (first, second), impulse_ns))
+        points = arbiter.contact_point_set.points
+        if impulse_ns > 0.0 and points:
+            point_m = (points[0].point_a.x, points[0].point_a.y)
+            self._contacts.append(Contact(self.time_s, (first, second), impulse_ns, point_m))
 
     def _add_rover(self, vehicle: Vehicle, frame: Airframe, yaw_locked: bool) -> _Rover:
         inertia = math.inf if yaw_locked else frame.yaw_inertia_kgm2

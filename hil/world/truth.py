@@ -6,7 +6,7 @@ Both go out as lines of JSON; times are world time (s), positions NED (m), impul
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 EPISODE_GAP_S = 0.25  # contacts of one pair closer in time than this are one episode
 
@@ -32,28 +32,35 @@ class TruthRecord:
 
 @dataclass(frozen=True)
 class Contact:
-    """Two bodies that pressed on each other during one step, and the impulse that took."""
+    """Two bodies that pressed on each other during one step: where (NED), and how hard."""
 
     time_s: float
     bodies: tuple[str, str]
     impulse_ns: float
+    point_m: tuple[float, float]
 
 
 @dataclass(frozen=True)
 class ContactEpisode:
-    """Contacts of one pair without a gap; `peak_impulse_ns` is the largest of any one step."""
+    """Contacts of one pair without a gap.
+
+    `peak_impulse_ns` is the largest of any one step, `point_m` is where it pressed.
+    """
 
     start_s: float
     end_s: float
     bodies: tuple[str, str]
     peak_impulse_ns: float
+    point_m: tuple[float, float]
 
-    def extended(self, contact: Contact) -> "ContactEpisode":
-        return replace(
-            self,
-            end_s=contact.time_s,
-            peak_impulse_ns=max(self.peak_impulse_ns, contact.impulse_ns),
-        )
+    @classmethod
+    def of(cls, c: Contact) -> Self:
+        return cls(c.time_s, c.time_s, c.bodies, c.impulse_ns, c.point_m)
+
+    def extended(self, c: Contact) -> "ContactEpisode":
+        if c.impulse_ns <= self.peak_impulse_ns:
+            return replace(self, end_s=c.time_s)
+        return replace(self, end_s=c.time_s, peak_impulse_ns=c.impulse_ns, point_m=c.point_m)
 
 
 class ContactLog:
@@ -66,8 +73,7 @@ class ContactLog:
         """Take the contacts of a step that ends at `time_s`; returns the episodes now over."""
         for c in contacts:
             begun = self._open.get(c.bodies)
-            first = ContactEpisode(c.time_s, c.time_s, c.bodies, c.impulse_ns)
-            self._open[c.bodies] = begun.extended(c) if begun else first
+            self._open[c.bodies] = begun.extended(c) if begun else ContactEpisode.of(c)
         over = [e for e in self._open.values() if time_s - e.end_s > EPISODE_GAP_S]
         for episode in over:
             del self._open[episode.bodies]
@@ -98,6 +104,7 @@ def contact_line(episode: ContactEpisode) -> str:
             "end_s": round(episode.end_s, 6),
             "bodies": list(episode.bodies),
             "peak_impulse_ns": round(episode.peak_impulse_ns, 6),
+            "point_m": [round(x, 6) for x in episode.point_m],
         }
     )
 
@@ -111,11 +118,13 @@ def parse_line(line: str) -> TruthRecord | ContactEpisode | None:
             return TruthRecord(float(tree["time_s"]), vehicles)
         if tree["type"] == "contact":
             first, second = tree["bodies"]
+            north_m, east_m = tree["point_m"]
             return ContactEpisode(
                 float(tree["time_s"]),
                 float(tree["end_s"]),
                 (str(first), str(second)),
                 float(tree["peak_impulse_ns"]),
+                (float(north_m), float(east_m)),
             )
     except (ValueError, KeyError, TypeError, AttributeError):
         pass

@@ -48,6 +48,6 @@ def record(scenario: Scenario, told: Outcome | None = None, off_by_m: float = 0.
     return RunRecord(
         told or outcome(),
         TruthRecord(60.0, vehicles),
-        (ContactEpisode(12.0, 14.0, ("rover_1", "rover_2"), 3.25),),
+        (ContactEpisode(12.0, 14.0, ("rover_1", "rover_2"), 3.25, (1.0, 2.0)),),
         tuple(Struck(f, 0.0) for f in scenario.faults),
     )

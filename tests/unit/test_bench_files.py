@@ -22,7 +22,7 @@ from hil.bench.folders import (
 )
 from hil.bench.lines import Tick, as_station_line, parse_station_line
 from hil.bench.ports import PortBases, choose_ports
-from hil.bench.recording import RECORDING, merge_recordings
+from hil.bench.recording import RECORDING, RecordedTruth, merge_recordings
 from hil.bench.runlog import EVENTS_FILE, TRUTH_FILE, RunLog
 from hil.cli import main
 from hil.errors import InputError, ProcessDiedError
@@ -101,12 +101,15 @@ def test_what_the_station_wrote_ends_up_in_the_run(folders: Folders) -> None:
     }
 
 
-def test_a_single_recording_becomes_the_mission(tmp_path: Path) -> None:
-    assert merge_recordings(tmp_path) is None
-    (tmp_path / "station.rrd").write_bytes(b"rows")
-    assert merge_recordings(tmp_path) == tmp_path / RECORDING
-    assert (tmp_path / RECORDING).read_bytes() == b"rows"
-    assert not (tmp_path / "station.rrd").exists()
+def test_the_truth_becomes_part_of_the_mission(folders: Folders) -> None:
+    assert merge_recordings(folders.run) is None
+    recorded = RecordedTruth(folders, rescue(), viewer=False)
+    recorded.truth(TruthRecord(1.0, {1: VehicleTruth(1.0, 2.0, 0.5, 0.0, 0.0)}))
+    recorded.contact(ContactEpisode(1.0, 2.0, ("rover_1", "rover_2"), 3.0, (1.0, 2.0)))
+    recorded.fault(1.0, "rover_2: motor 3 off")
+    recorded.close()
+    assert merge_recordings(folders.run) == folders.run / RECORDING
+    assert [p.name for p in folders.run.iterdir()] == [RECORDING]
 
 
 def test_free_ports_are_free_for_every_vehicle() -> None:
@@ -161,9 +164,9 @@ def test_broken_station_lines_name_the_station(line: str) -> None:
 def test_the_log_keeps_what_was_said(tmp_path: Path) -> None:
     scenario = rescue()
     truth = TruthRecord(1.0, {1: VehicleTruth(1.0, 2.0, 0.0, 0.0, 0.0)})
-    episode = ContactEpisode(1.0, 2.0, ("rover_1", "rover_2"), 3.0)
+    episode = ContactEpisode(1.0, 2.0, ("rover_1", "rover_2"), 3.0, (1.0, 2.0))
     event = {"type": "event", "time_s": 2.0, "kind": "anomaly", "text": "é", "data": {"a": 1}}
-    with RunLog(scenario, tmp_path, quiet()) as log:
+    with RunLog(scenario, tmp_path, quiet(), None) as log:
         log.truth(truth)
         log.contact(episode)
         log.struck(scenario.faults[0], 0.0)

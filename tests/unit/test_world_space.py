@@ -148,6 +148,7 @@ def test_head_on_collision_is_plastic() -> None:
     assert first.east_mps == pytest.approx(second.east_mps, abs=1e-3)
     assert first.east_mps == pytest.approx(common, abs=DECELERATION / world.physics_hz)
     assert world.contacts()[0].bodies == ("rover_1", "rover_2")
+    assert world.contacts()[0].point_m == pytest.approx((0.0, 0.305), abs=0.01)
     assert world.contacts()[0].impulse_ns == pytest.approx(MASS * speed_before / 2, rel=0.05)
 
 

@@ -17,11 +17,12 @@ from hil.world.truth import (
 )
 
 PAIR, WALL = ("a", "b"), ("a", "wall_north")
+HERE = (1.0, 2.0)
 
 
 def test_lines_round_trip() -> None:
     record = TruthRecord(1.5, {1: VehicleTruth(1.0, 2.0, 0.25, -0.5, 0.0)})
-    episode = ContactEpisode(1.0, 2.0, PAIR, 3.5)
+    episode = ContactEpisode(1.0, 2.0, PAIR, 3.5, (0.5, -0.5))
     assert parse_line(truth_line(record)) == record
     assert parse_line(contact_line(episode)) == episode
 
@@ -34,18 +35,18 @@ def test_other_lines_are_none(line: str) -> None:
 def test_contacts_close_in_time_are_one_episode() -> None:
     log = ContactLog()
     for time_s, impulse_ns in ((1.0, 2.0), (1.1, 5.0), (1.3, 1.0)):
-        assert log.add(time_s, [Contact(time_s, PAIR, impulse_ns)]) == ()
+        assert log.add(time_s, [Contact(time_s, PAIR, impulse_ns, (time_s, 0.0))]) == ()
     assert log.add(1.5, []) == ()
-    assert log.add(1.6, []) == (ContactEpisode(1.0, 1.3, PAIR, 5.0),)
+    assert log.add(1.6, []) == (ContactEpisode(1.0, 1.3, PAIR, 5.0, (1.1, 0.0)),)
     assert log.close() == ()
 
 
 def test_pairs_do_not_mix_and_open_episodes_are_closed_at_the_end() -> None:
     log = ContactLog()
-    log.add(1.0, [Contact(1.0, PAIR, 2.0), Contact(1.0, WALL, 1.0)])
+    log.add(1.0, [Contact(1.0, PAIR, 2.0, HERE), Contact(1.0, WALL, 1.0, HERE)])
     assert log.close() == (
-        ContactEpisode(1.0, 1.0, PAIR, 2.0),
-        ContactEpisode(1.0, 1.0, WALL, 1.0),
+        ContactEpisode(1.0, 1.0, PAIR, 2.0, HERE),
+        ContactEpisode(1.0, 1.0, WALL, 1.0, HERE),
     )
 
 
