@@ -66,6 +66,7 @@ def rover_parameters(sysid: int, station_sysid: int, airframe: Airframe) -> Para
     cruise_mps = airframe.motors[0].free_speed_mps / 2.0  # speed at CRUISE_THROTTLE percent
     return Parameters(
         (
+            _fixed("ARMING_CHECK", 1),  # all of them
             _fixed("CRUISE_SPEED", cruise_mps, ParamType.REAL32),
             _fixed("CRUISE_THROTTLE", 50, int8),
             _fixed("FORMAT_VERSION", 16),
