@@ -10,9 +10,9 @@ from typing import Any
 from rich.console import Console as Terminal
 from rich.console import Group, RenderableType
 from rich.live import Live
-from rich.padding import Padding
 from rich.panel import Panel
 from rich.progress_bar import ProgressBar
+from rich.rule import Rule
 from rich.table import Table
 from rich.text import Text
 
@@ -82,14 +82,7 @@ class Console:
         text = Text(" ".join(scenario.description.split()) or scenario.name)
         title = f"[bold]{scenario.name}[/]  seed {scenario.seed}, {how}"
         self._out.print(
-            Panel(
-                text,
-                title=title,
-                title_align="left",
-                subtitle=str(folder),
-                style="dim",
-                width=WIDTH,
-            )
+            Panel(text, title=title, title_align="left", subtitle=str(folder), style="dim")
         )
 
     def say(self, text: str) -> None:
@@ -152,10 +145,10 @@ class Console:
             Text(f"{number} {title}".strip(), style="bold cyan"),
             f"fleet {sim_s:.1f} s   wall {wall_s:.0f} s",
         )
-        parts: list[RenderableType] = [Text("─" * WIDTH, style="dim"), line]
+        parts: list[RenderableType] = [Rule(style="dim"), line]
         if self._training is not None:
             parts.append(self._training.bar())
-        return Padding(Group(*parts), (0, 0, 0, 0))
+        return Group(*parts)
 
 
 class Training:

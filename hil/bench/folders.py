@@ -77,7 +77,12 @@ def write_inputs(scenario: Scenario, folders: Folders) -> None:
 
 
 def collect(folders: Folders) -> None:
-    """Move what the station wrote into the run's folder; what is there already keeps its name."""
+    """Move what the station wrote into the run's folder; what is there already keeps its name.
+
+    Does nothing the second time.
+    """
+    if not folders.station.exists():
+        return
     for item in sorted(folders.station.iterdir()):
         target = folders.run / item.name
         if target.exists():

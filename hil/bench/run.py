@@ -59,20 +59,30 @@ def run(scenario: Scenario, options: RunOptions, console: Console | None = None)
         scenario = pin_ports(scenario, choose_ports(scenario))
     with _interruptible(), console or Console() as shown:
         create_folders(folders)
-        write_inputs(scenario, folders)
-        shown.begin(scenario, folders.run, _how(options))
-        failure: HilError | None = None
-        viewer = options.viewer and open_viewer()
-        truth = RecordedTruth(folders, scenario, viewer)
-        with RunLog(scenario, folders.run, shown, truth) as log:
-            try:
-                _backend(scenario, folders, options, log, onsets)
-            except HilError as error:
-                failure = error
-        met = _conclude(scenario, folders, log.record(), failure, shown)
+        try:
+            write_inputs(scenario, folders)
+            shown.begin(scenario, folders.run, _how(options))
+            record, failure = _attempt(scenario, folders, options, shown, onsets)
+            met = _conclude(scenario, folders, record, failure, shown)
+        finally:
+            collect(folders)
     if failure is not None:
         raise failure
     return EXIT_AS_EXPECTED if met else EXIT_NOT_AS_EXPECTED
+
+
+def _attempt(
+    scenario: Scenario, folders: Folders, options: RunOptions, console: Console, onsets: Onsets
+) -> tuple[RunRecord, HilError | None]:
+    """What the backend brought about, and what cut it short, if anything did."""
+    viewer = options.viewer and open_viewer()
+    truth = RecordedTruth(folders, scenario, viewer)
+    with RunLog(scenario, folders.run, console, truth) as log:
+        try:
+            _backend(scenario, folders, options, log, onsets)
+        except HilError as error:
+            return log.record(), error
+        return log.record(), None
 
 
 def _backend(

@@ -10,8 +10,6 @@ from rich.text import Text
 from hil.bench.result import COMPLETED
 from hil.scenario import Scenario
 
-WIDTH = 100
-
 
 def summary(tree: dict[str, Any], scenario: Scenario) -> RenderableType:
     """Verdict and truth on top, goals and phases side by side below."""
@@ -29,7 +27,7 @@ def summary(tree: dict[str, Any], scenario: Scenario) -> RenderableType:
 
 def _panel(title: str, colour: str, *parts: RenderableType) -> Panel:
     words = Text(title, style="bold")
-    return Panel(Group(*parts), title=words, title_align="left", border_style=colour, width=WIDTH)
+    return Panel(Group(*parts), title=words, title_align="left", border_style=colour)
 
 
 def _verdict(tree: dict[str, Any], names: dict[str, str]) -> RenderableType:
