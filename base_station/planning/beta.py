@@ -49,15 +49,15 @@ NEAR_START_SHARE = 0.5  # of the episodes at first; fades to none at NEAR_START_
 NEAR_START_UNTIL = 0.6
 SETTLE_STEPS = 2  # control periods in HOLD before success is judged
 SLACK_M = 0.05
-PUSH_WEIGHT = 0.5  # of the way of the nearest rescuer to where it must push
+PUSH_WEIGHT = 1.5  # of the way still to be pushed, and of the nearest rescuer's to get there
 
 
 @dataclass(frozen=True, eq=False)
 class BetaProblem:
     """Bring every vehicle from `start` [V, S] to its goal [V, 2] in `steps` control periods.
 
-    `broken` is the vehicle that the verdict names, None when nothing is wrong. `blocked` [2] marks
-    the NED axes along which it can't drive itself; all zero when it can, or can turn.
+    `broken` is the vehicle that the verdict names, None when nothing is wrong. `blocked` [2, 2]
+    projects on the directions (north, east) in which it can't drive itself; 0 when it can turn.
     """
 
     model: FleetModel
@@ -108,7 +108,7 @@ class BetaProblem:
         way = np.where(delivered, 0.0, np.linalg.norm(offset, axis=-1)).sum(axis=1)
         if self.broken is None or self.model.size == 1 or not self.blocked.any():
             return np.asarray(-way)
-        push = offset[:, self.broken] * self.blocked
+        push = offset[:, self.broken] @ self.blocked
         length = np.linalg.norm(push, axis=1, keepdims=True)
         position, radius = states[..., NORTH : EAST + 1], self.model.vehicles.radius_m
         behind = push / np.maximum(length, 1e-9)
@@ -117,7 +117,7 @@ class BetaProblem:
         spots = position[:, self.broken, None] - behind[:, None] * reach[:, None]
         detour = np.linalg.norm(position[:, helpers] - spots, axis=-1).min(axis=1)
         wanted = ~delivered[:, self.broken] & (length[:, 0] > 0.5 * self.radius_m)
-        result: Array = -way - PUSH_WEIGHT * np.where(wanted, detour, 0.0)
+        result: Array = -way - PUSH_WEIGHT * np.where(wanted, detour + length[:, 0], 0.0)
         return result
 
 
@@ -216,7 +216,7 @@ def success_share(
     states = nominal_starts(problem, rng, n)
     delivered = np.tile(problem.delivered, (n, 1))
     for k in range(problem.steps + SETTLE_STEPS):
-        active = ~delivered.all(axis=1) & (k < problem.steps)
+        active = np.asarray(~delivered.all(axis=1) & (k < problem.steps))
         observations = problem.observe(states, delivered, np.full(n, k))
         problem.move(parameters, states, act(weights, observations), active)
         if k < problem.steps:

@@ -14,7 +14,8 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 FAR_M = 4.0  # scale of distances across the arena ...
-NEAR_M = 0.8  # ... and of those that decide about a push or an arrival
+NEAR_M = 0.3  # ... and of those that decide about a push or an arrival: below it a policy
+# that eases off too early stalls, because pushing takes a third of full speed to start
 SETTLED_MPS = 0.4  # a broken vehicle must not roll out of its goal: it coasts 8 cm from this speed
 
 

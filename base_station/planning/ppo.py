@@ -247,8 +247,3 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:  # noqa: ARG002
         return [False] * len(self._get_indices(indices))
-
-
-def derived_seed(seed: int, attempt: int) -> int:
-    """The seed of a restart: attempt k of a request always learns the same."""
-    return int(np.random.SeedSequence([seed, attempt]).generate_state(1)[0] % 2**31)

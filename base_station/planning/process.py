@@ -1,0 +1,107 @@
+"""The planner as a process: requests as JSON lines on stdin, progress and plans on stdout.
+
+`python -m base_station.planning.process STATION_VIEW`. Says `ready` when everything is compiled
+and warm; ends at the end of its input or on SIGTERM; logs to stderr.
+"""
+
+import logging
+import signal
+import sys
+from dataclasses import replace
+from pathlib import Path
+from types import FrameType
+from typing import TextIO
+
+import numpy as np
+
+from base_station.hypotheses import candidates
+from base_station.planning import ppo
+from base_station.planning.alpha import AlphaTask
+from base_station.planning.planner import alpha_problem, best_candidate, plan
+from base_station.planning.requests import PlanRequest, decode, encode
+from base_station.twin import FleetModel, initial_state
+from hil.errors import InputError
+from hil.scenario import StationView, load_station_view
+
+READY = "ready"
+LOG = logging.getLogger("planner")
+
+
+def serve(view: StationView, lines: TextIO, out: TextIO) -> None:
+    """Answer requests until the input ends; a line that is no request is logged and skipped."""
+
+    def say(text: str) -> None:
+        out.write(text + "\n")
+        out.flush()
+
+    warm_up(view)
+    say(READY)
+    for line in lines:
+        try:
+            request = decode(line)
+        except (ValueError, TypeError, KeyError) as error:
+            LOG.error("ignored a line that is no request: %s", error)
+            continue
+        if not isinstance(request, PlanRequest):
+            LOG.error("ignored a %s; only requests come in", type(request).__name__)
+            continue
+        LOG.info("request %d: plan %s", request.number, request.kind)
+        ready = plan(view, request, lambda progress: say(encode(progress)))
+        say(encode(ready))
+        LOG.info("request %d: %d trainings", request.number, len(ready.trainings))
+
+
+def warm_up(view: StationView) -> None:
+    """Compile the kernel and learn for one rollout, so that the first request is not slower."""
+    start = initial_state(np.zeros((len(view.fleet), 2)), np.zeros(len(view.fleet)))
+    hypotheses = tuple(h for h in candidates(view.fleet[0], view.diagnosis.priors) if h.has_twin)[
+        :2
+    ]
+    request = PlanRequest(
+        number=0,
+        kind="alpha",
+        seed=0,
+        preset="tuned",
+        hypotheses=hypotheses,
+        posterior=(0.5, 0.5),
+        states=np.stack([apart(view, start)] * 2),
+        delivered=(False,) * len(view.fleet),
+    )
+    problem = alpha_problem(view, request)
+    preset = replace(ppo.TUNED_ALPHA, environments=4, batch_size=128, epochs=1, total_timesteps=128)
+    task = AlphaTask(problem, preset.environments, np.random.default_rng(0))
+    learned = ppo.train(task, preset, 0, lambda *_: False, lambda *_: None)
+    best_candidate(problem, learned.weights, learned.log_std, 0)
+
+
+def apart(view: StationView, start: np.ndarray) -> np.ndarray:
+    """The start with its vehicles in a row, out of each other's reach."""
+    model = FleetModel.from_view(view)
+    start = start.copy()
+    start[:, 0] = 3.0 * float(model.vehicles.radius_m.max()) * np.arange(model.size)
+    return start
+
+
+def main(arguments: list[str]) -> int:
+    if len(arguments) != 1:
+        print("usage: python -m base_station.planning.process STATION_VIEW", file=sys.stderr)
+        return InputError.exit_code
+    logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="%(name)s: %(message)s")
+    signal.signal(signal.SIGTERM, _leave)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the station's; it then ends the input
+    try:
+        serve(load_station_view(Path(arguments[0])), sys.stdin, sys.stdout)
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return error.exit_code
+    except BrokenPipeError:
+        return 0
+    return 0
+
+
+def _leave(_signal: int, _frame: FrameType | None) -> None:
+    raise SystemExit(0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
