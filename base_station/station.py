@@ -145,8 +145,7 @@ class Station:
             wall_s - self._beats_s[0] >= HEARTBEAT_S
             or self.time_s - self._beats_s[1] >= HEARTBEAT_S
         ):
-            self._touched_s: dict[tuple[int, int], float] = {}
-        self._beats_s = (wall_s, self.time_s)
+            self._beats_s = (wall_s, self.time_s)
             commands += [Heartbeat(m.sysid) for m in self.view.fleet]
         if wall_s - self._asked_time_s >= TIMESYNC_S:
             self._asked_time_s = wall_s
