@@ -1,28 +1,37 @@
 """The tabs a person sees: one per phase of the run, plus map and log. Units are in the titles."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
-import rerun as rr
 import rerun.blueprint as rrb
 
-from base_station.recording.columns import SIM_TIME
-from base_station.recording.palette import hypothesis_color
+from base_station.recording.columns import SIM_TIME, WALL_TIME
+from base_station.recording.legend import MARGIN
+from base_station.recording.scene import hypotheses
 from hil.scenario import Arena, StationView
 
 TABS = ("Overview", "Diagnosis", "Learning", "Mission", "Map", "Log")
-PLANE = ("/plane/**", "/fleet/**", "/trail/**", "/setpoint/**", "/truth/**")
-TWINS, PLAN = ("/twins/**",), ("/plan/**",)
-DARK = (14, 16, 20)
-SHORT_S, CONTACT_S = 12.0, 2.0
-EYE_HEIGHTS = 1.25  # height of the eye over the longer side of the arena
+REALITY = ("/plane/**", "/fleet", "/trail", "/setpoint", "/truth/**")
+TWINS, PLAN = "/twins/**", "/plan/**"
+DARK, GRID = (14, 16, 20), (255, 255, 255, 20)
+SHORT_S, TUBE_S, CONTACT_S, WHOLE_S = 15.0, 4.0, 3.0, 24 * 3600.0
+EYE_HEIGHTS = 1.08  # height of the eye, over the side of what it sees
+ASPECT = 1.7  # width of a view of the plane, over its height
+MOTOR_TABS = 6  # vehicles whose motors get a plot
 
 
-def blueprint(view: StationView, tab: str = TABS[0]) -> Any:
-    """The whole layout, with `tab` in front. Raises ValueError for a tab that is not there."""
-    tabs = (_overview, _diagnosis, _learning, _mission, _map, _log)
+def blueprint(view: StationView) -> Any:
+    """The whole layout."""
     return rrb.Blueprint(
-        rrb.Tabs(*(make(view) for make in tabs), active_tab=TABS.index(tab)),
+        rrb.Tabs(
+            _overview(view),
+            _diagnosis(view),
+            _learning(view),
+            _mission(view),
+            _map(view),
+            _log(),
+            active_tab=0,
+        ),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         rrb.TimePanel(state="collapsed", timeline=SIM_TIME),
@@ -31,98 +40,130 @@ def blueprint(view: StationView, tab: str = TABS[0]) -> Any:
 
 
 def _overview(view: StationView) -> Any:
-    left = rrb.Vertical(_plane(view, "Plane", (*PLANE, *TWINS)), _phases(), row_shares=[3, 1.2])
-    right = rrb.Vertical(_posterior(), _alarm("north"), _alarm("east"), _events())
+    plane = _plane(view, "Plane", (*REALITY, TWINS), SHORT_S)
+    left = rrb.Vertical(plane, _phases(), row_shares=[5, 3])
+    right = rrb.Vertical(
+        _posterior(), _alarm("north"), _alarm("east"), _events(), row_shares=[4, 3, 3, 5]
+    )
     return rrb.Horizontal(left, right, column_shares=[3, 2], name="Overview")
 
 
 def _diagnosis(view: StationView) -> Any:
-    plane = _plane(view, "Reality and twins", (*PLANE, *TWINS, *PLAN))
-    behind = _plot("How far each explanation is behind the best (nats; -4.6 is 1 : 100)", "/belief/behind_best")
-    left = rrb.Vertical(plane, _phases(), row_shares=[3, 1.2])
+    plane = _plane(view, "Reality and twins", (*REALITY, TWINS, PLAN), SHORT_S)
+    behind = _plot("Evidence lost to the best (nats; -4.6 is 1 : 100)", "/belief/behind_best")
     right = rrb.Vertical(
-        _posterior(),
+        _posterior(legend=True),
         behind,
         rrb.Horizontal(_alarm("north"), _alarm("east")),
         rrb.Horizontal(_residual("north"), _residual("east")),
+        row_shares=[4, 3, 2, 2],
     )
+    left = rrb.Vertical(plane, _phases(), row_shares=[5, 3])
     return rrb.Horizontal(left, right, name="Diagnosis")
 
 
 def _learning(view: StationView) -> Any:
-    curves = _plot("Learning curves: mean reward of an episode", "/learning")
-    plan = _plane(view, "Plan alpha: what each hypothesis predicts", ("/plane/**", "/fleet/**", *PLAN))
-    return rrb.Horizontal(curves, plan, name="Learning")
+    over_time = rrb.Vertical(*(_curves(kind) for kind in ("alpha", "beta")))
+    over_steps = rrb.Vertical(*(_bars(kind) for kind in ("alpha", "beta")))
+    plan = _plane(view, "Plan alpha, predicted", ("/plane/**", "/fleet", PLAN), aspect=0.75)
+    return rrb.Horizontal(over_time, over_steps, plan, column_shares=[1, 1, 1.3], name="Learning")
 
 
 def _mission(view: StationView) -> Any:
-    plane = _plane(view, "Mission", PLANE, trail_s=None)
-    motors = [_plot(f"Motor outputs of {m.name} (-1 to 1)", f"/motors/{m.name}") for m in view.fleet[:3]]
-    left = rrb.Vertical(plane, _phases(), row_shares=[3, 1.2])
+    plane = _plane(view, "Mission", REALITY, WHOLE_S)
+    motors = [
+        _plot(f"Motors {m.name} (-1 to 1)", f"/motors/{m.name}", legend=True)
+        for m in view.fleet[:MOTOR_TABS]
+    ]
     right = rrb.Vertical(
-        _plot("Distance to goal, as reported (m)", "/goal_distance"),
+        _plot("Distance to goal, as reported (m)", "/goal_distance/**", legend=True),
         _plot("Speed, as reported (m/s)", "/speed"),
         rrb.Tabs(*motors, _plot("Battery (%)", "/battery"), _plot("GPS satellites", "/satellites")),
+        row_shares=[4, 3, 4],
     )
+    left = rrb.Vertical(plane, _phases(), row_shares=[5, 3])
     return rrb.Horizontal(left, right, name="Mission")
 
 
 def _map(view: StationView) -> Any:
-    return rrb.MapView(origin="/map", name="Map")
+    plane = _plane(view, "Plane", REALITY, WHOLE_S, aspect=1.0)
+    title = "Map, WGS84 (tiles need the Internet)"
+    return rrb.Horizontal(rrb.MapView(origin="/map", name=title), plane, name="Map")
 
 
-def _log(view: StationView) -> Any:
-    brief = rrb.TextDocumentView(origin="/brief", name="Brief: verdict, legend, versions")
+def _log() -> Any:
+    brief = rrb.TextDocumentView(origin="/brief", name="Verdict, legend, versions")
     return rrb.Horizontal(brief, _events(), name="Log")
 
 
-def _plane(view: StationView, name: str, contents: Sequence[str], trail_s: float | None = SHORT_S) -> Any:
-    trails = ["/trail", "/truth/trail", "/twins"]
-    overrides: dict[str, Any] = {path: _last(trail_s) for path in trails}
+def _plane(
+    view: StationView,
+    name: str,
+    contents: Sequence[str],
+    trail_s: float = 0.0,
+    aspect: float = ASPECT,
+) -> Any:
+    shown_s = {"/trail": trail_s, "/truth/trail": trail_s}
+    if TWINS in contents:
+        shown_s |= {f"/twins/{h}/trail": trail_s for h in hypotheses(view)}
+        shown_s |= {f"/twins/{h}/report": TUBE_S for h in hypotheses(view)}
+    shown_s["/truth/contacts"] = max(CONTACT_S, trail_s if trail_s == WHOLE_S else 0.0)
     return rrb.Spatial3DView(
         origin="/",
         contents=list(contents),
-        name=f"{name} (from above, north up, 1 m grid)",
+        name=f"{name} (seen from above, north up, 1 m grid)",
         background=DARK,
-        line_grid=rrb.LineGrid3D(visible=True, spacing=1.0, stroke_width=0.5, color=(255, 255, 255, 24)),
-        eye_controls=_eye(view.arena),
-        overrides=overrides,
+        line_grid=rrb.LineGrid3D(visible=True, spacing=1.0, stroke_width=1.0, color=GRID),
+        eye_controls=_eye(view.arena, aspect),
+        overrides={path: _last(seconds) for path, seconds in shown_s.items()},
     )
 
 
-def _eye(arena: Arena) -> Any:
+def _eye(arena: Arena, aspect: float) -> Any:
     east_m = (arena.east_min_m + arena.east_max_m) / 2
     north_m = (arena.north_min_m + arena.north_max_m) / 2
-    size_m = max(arena.north_max_m - arena.north_min_m, arena.east_max_m - arena.east_min_m)
+    width_m = (1.0 + 4.0 * MARGIN) * (arena.east_max_m - arena.east_min_m)
+    side_m = max(arena.north_max_m - arena.north_min_m, width_m / aspect)
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
-        position=(east_m, north_m, EYE_HEIGHTS * size_m),
+        position=(east_m, north_m, EYE_HEIGHTS * side_m),
         look_target=(east_m, north_m, 0.0),
         eye_up=(0.0, 1.0, 0.0),
     )
 
 
-def _last(seconds: float | None) -> Any:
-    start = (
-        rrb.TimeRangeBoundary.infinite()
-        if seconds is None
-        else rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds)
-    )
+def _last(seconds: float) -> Any:
+    start = rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds)
     end = rrb.TimeRangeBoundary.cursor_relative(seconds=0.0)
-    return rrb.VisibleTimeRanges(timeline=SIM_TIME, start=start, end=end)
+    return rrb.VisibleTimeRanges(
+        [rrb.VisibleTimeRange(timeline, start=start, end=end) for timeline in (SIM_TIME, WALL_TIME)]
+    )
 
 
-def _posterior() -> Any:
-    return _plot("What is wrong? Posterior probability", "/belief/posterior", y=(0.0, 1.0))
+def _posterior(legend: bool = False) -> Any:
+    name = "What is wrong? Posterior probability"
+    return _plot(name, "/belief/posterior", legend=legend, y=(-0.05, 1.05))
 
 
 def _alarm(axis: str) -> Any:
-    contents = [f"/alarm/{axis}/**", "/alarm/threshold"]
-    return _plot(f"Alarm statistic, {axis} (standard deviations)", contents)
+    return _plot(f"Alarm statistic {axis} (σ)", (f"/alarm/{axis}", "/alarm/threshold"))
 
 
 def _residual(axis: str) -> Any:
-    return _plot(f"Residual, {axis} (standard deviations)", f"/residual/{axis}")
+    return _plot(f"Residual {axis} (σ)", f"/residual/{axis}")
+
+
+def _curves(kind: str) -> Any:
+    return _plot(f"Learning {kind}: mean reward as it grew", f"/learning/{kind}/**", legend=True)
+
+
+def _bars(kind: str) -> Any:
+    return rrb.BarChartView(
+        origin="/",
+        contents=[f"/curves/{kind}/**"],
+        name=f"Learning {kind}: mean reward over steps",
+        plot_legend=rrb.PlotLegend(visible=False),
+    )
 
 
 def _phases() -> Any:
@@ -130,17 +171,23 @@ def _phases() -> Any:
 
 
 def _events() -> Any:
-    return rrb.TextLogView(
-        origin="/events", contents=["/events/**", "/truth/faults"], name="Events"
-    )
+    columns = rrb.TextLogColumns(timeline_columns=[SIM_TIME], text_log_columns=["LogLevel", "Body"])
+    contents = ["/events/**", "/truth/faults"]
+    return rrb.TextLogView(origin="/", contents=contents, name="Events", columns=columns)
 
 
-def _plot(name: str, contents: str | list[str], y: tuple[float, float] | None = None) -> Any:
+def _plot(
+    name: str,
+    paths: str | Iterable[str],
+    legend: bool = False,
+    y: tuple[float, float] | None = None,
+) -> Any:
+    roots = [paths] if isinstance(paths, str) else paths
     return rrb.TimeSeriesView(
         origin="/",
-        contents=[f"{contents}/**"] if isinstance(contents, str) else contents,
+        contents=list(roots),
         name=name,
         axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
         axis_y=rrb.ScalarAxis(range=y) if y else None,
-        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend),
     )

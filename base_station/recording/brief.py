@@ -39,7 +39,13 @@ class Brief:
         return event.kind in ("verdict", "end")
 
     def markdown(self) -> str:
-        parts = (f"# Run {self._run_id}", self._verdict(), self._story(), "## How to read this", LEGEND)
+        parts = (
+            f"# Run {self._run_id}",
+            self._verdict(),
+            self._story(),
+            "## How to read this",
+            LEGEND,
+        )
         return "\n\n".join(part for part in (*parts, self._setting()) if part)
 
     def _verdict(self) -> str:
@@ -68,13 +74,26 @@ class Brief:
             f"| {m.name} | {m.sysid} | {m.airframe} | {m.goal.north_m:g} | {m.goal.east_m:g} |"
             for m in view.fleet
         )
-        return (
-            "## Fleet, as the station was told\n\n"
-            "| Name | System id | Airframe | Goal north (m) | Goal east (m) |\n|---|---|---|---|---|\n"
-            f"{fleet}\n\nHeading {view.yaw}; evidence: {view.diagnosis.evidence}; decides at "
-            f"{view.diagnosis.decide_at:g}; preset {view.planning.preset}.\n\n## Versions\n\n{_versions()}"
-            f"\n\n## Station view\n\n```json\n{view.model_dump_json(indent=1)}\n```"
-        )
+        told = view.model_dump_json(indent=1)
+        return f"""\
+## Fleet, as the station was told
+
+| Name | System id | Airframe | Goal north (m) | Goal east (m) |
+|---|---|---|---|---|
+{fleet}
+
+Heading {view.yaw}; evidence: {view.diagnosis.evidence}; decides at {view.diagnosis.decide_at:g};
+preset {view.planning.preset}.
+
+## Versions
+
+{_versions()}
+
+## Station view
+
+```json
+{told}
+```"""
 
 
 def _versions() -> str:

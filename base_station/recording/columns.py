@@ -21,25 +21,33 @@ class Kind:
     build: Callable[[NDArray[np.float64]], Any]
 
 
-def _poses(flat: NDArray[np.float64]) -> Any:
-    half_rad = -0.5 * flat[:, 2]
-    zero = np.zeros(len(flat))
-    return rr.Transform3D.columns(
-        translation=np.column_stack((flat[:, :2], zero)),
-        quaternion=np.column_stack((zero, zero, np.sin(half_rad), np.cos(half_rad))),
+def _bodies(flat: NDArray[np.float64]) -> Any:
+    """A disc, and a line from its centre to its nose."""
+    centers, noses = flat[:, :3], flat[:, 3:]
+    strips = np.stack((centers, noses), axis=1)
+    discs, lines = rr.Cylinders3D.columns(centers=centers), rr.LineStrips3D.columns(strips=strips)
+    return rr.ComponentColumnList([*discs, *lines])
+
+
+def _segments(flat: NDArray[np.float64]) -> Any:
+    return rr.LineStrips3D.columns(
+        strips=flat[:, :6].reshape(-1, 2, 3), colors=flat[:, 6].astype(np.uint32)
     )
 
 
 SCALARS = Kind(1, lambda flat: rr.Scalars.columns(scalars=flat[:, 0]))
-POSES = Kind(3, _poses)  # east m, north m, yaw rad (clockwise from north)
-SEGMENTS = Kind(6, lambda flat: rr.LineStrips3D.columns(strips=flat.reshape(-1, 2, 3)))
+BODIES = Kind(6, _bodies)  # centre, nose
+SEGMENTS = Kind(7, _segments)  # both ends, colour as 0xRRGGBBAA
 ARROWS = Kind(6, lambda flat: rr.Arrows3D.columns(origins=flat[:, :3], vectors=flat[:, 3:]))
-POINTS = Kind(3, lambda flat: rr.Points3D.columns(positions=flat))
-DISCS = Kind(3, lambda flat: rr.Cylinders3D.columns(centers=flat))
-ELLIPSES = Kind(
-    6, lambda flat: rr.Ellipsoids3D.columns(centers=flat[:, :3], half_sizes=flat[:, 3:])
-)
+RINGS = Kind(3, lambda flat: rr.Cylinders3D.columns(centers=flat))
+SPOTS = Kind(6, lambda flat: rr.Ellipsoids3D.columns(centers=flat[:, :3], half_sizes=flat[:, 3:]))
 GEO_POINTS = Kind(2, lambda flat: rr.GeoPoints.columns(positions=flat))  # degrees
+
+
+def set_time(stream: Any, time_s: float) -> None:
+    """What is logged from here on belongs to `time_s` (sim_time, s) and now (wall_time)."""
+    stream.set_time(SIM_TIME, duration=time_s)
+    stream.set_time(WALL_TIME, timestamp=time.time())
 
 
 class Batch:

@@ -83,7 +83,7 @@ class Channel(Generic[W]):
         outlet.put(self._open)
 
     def tell(self, call: Callable[[W], None]) -> None:
-        self.outlet.put(lambda: self._writer and call(self._writer))
+        self.outlet.put(lambda: call(self._writer) if self._writer is not None else None)
 
     def close(self) -> None:
         self.tell(lambda writer: writer.close())

@@ -1,7 +1,7 @@
 """Colours and names that mean the same in every view.
 
-The hues are Okabe and Ito's, which people with any kind of colour blindness can tell apart. Vehicles
-and hypotheses share none. Broken motors are warm, broken GPS is cool, no opinion is grey.
+The hues are Okabe and Ito's, which people with any kind of colour blindness can tell apart.
+Vehicles and hypotheses share none. Broken motors are warm, broken GPS is cool, nothing is grey.
 """
 
 from collections.abc import Sequence
@@ -16,6 +16,8 @@ ORANGE: Rgb = (230, 159, 0)
 PURPLE: Rgb = (204, 121, 167)
 BLUE: Rgb = (0, 114, 178)
 WHITE: Rgb = (255, 255, 255)
+BLACK: Rgb = (0, 0, 0)
+DIM: Rgb = (110, 116, 126)
 LIGHT_GREY: Rgb = (200, 200, 200)
 GREY: Rgb = (130, 130, 130)
 
@@ -36,23 +38,23 @@ _HYPOTHESES: dict[str, Rgb] = {
 }
 _OTHERS = (VERMILION, PURPLE, ORANGE, BLUE)
 
-_PHASES: dict[str, Rgb] = {
-    "connect": GREY,
-    "arm": GREY,
-    "probe": SKY_BLUE,
-    "plan_alpha": PURPLE,
-    "experiment": VERMILION,
-    "plan_beta": PURPLE,
-    "mission": GREEN,
-    "return": GREEN,
-    "hold": YELLOW,
-    "done": LIGHT_GREY,
-    "idle": GREY,
-    "probing": SKY_BLUE,
-    "suspect": YELLOW,
-    "helping": ORANGE,
-    "home": LIGHT_GREY,
-    "held": YELLOW,
+_PHASES: dict[str, Rgb] = {  # muted, so that nobody takes a phase for a vehicle or a hypothesis
+    "connect": (70, 74, 82),
+    "arm": (70, 74, 82),
+    "probe": (62, 104, 138),
+    "plan_alpha": (98, 84, 140),
+    "experiment": (150, 88, 58),
+    "plan_beta": (98, 84, 140),
+    "mission": (50, 112, 92),
+    "return": (50, 112, 92),
+    "hold": (140, 124, 50),
+    "done": (105, 110, 118),
+    "idle": (46, 50, 56),
+    "probing": (62, 104, 138),
+    "suspect": (140, 124, 50),
+    "helping": (98, 122, 60),
+    "home": (105, 110, 118),
+    "held": (46, 50, 56),
 }
 PHASES: Sequence[tuple[str, Rgb]] = tuple(_PHASES.items())
 

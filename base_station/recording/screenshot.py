@@ -22,7 +22,7 @@ START_S, LOAD_S, SETTLE_S, POLL_S = 30.0, 60.0, 15.0, 0.2
 
 
 def screenshot(rrd: Path, time_s: float, out_png: Path, view: str | None = None) -> None:
-    """One picture at sim_time `time_s`: of a tab (see `TABS`), or of one view, by its title's start.
+    """One picture at sim_time `time_s`: of a tab (`TABS`), or of one view by its title's start.
 
     Raises InputError for an unknown view, HilError where no viewer can run.
     """
@@ -93,19 +93,17 @@ class Viewer:
 
     def _show_tab(self, name: str) -> None:
         tree = self._client.get_blueprint().blueprint
-        titled = {
+        titles = {
             path.strip("/"): fields[kind].get("display_name")
             for path, fields in tree.items()
             for kind in ("ContainerBlueprint", "ViewBlueprint")
             if kind in fields
         }
-        tabs = next(
-            fields["ContainerBlueprint"]
-            for fields in tree.values()
-            if [titled.get(c) for c in fields.get("ContainerBlueprint", {}).get("contents", ())]
-            == list(TABS)
-        )
-        tabs["active_tab"] = tabs["contents"][TABS.index(name)]
+        for fields in tree.values():
+            tabs = fields.get("ContainerBlueprint", {})
+            contents = [path.strip("/") for path in tabs.get("contents", ())]
+            if tuple(titles.get(path) for path in contents) == TABS:
+                tabs["active_tab"] = contents[TABS.index(name)]
         self._client.set_blueprint(tree, of="recording")
 
     def _find(self, title: str) -> str:

@@ -4,7 +4,6 @@ A viewer can switch `/truth` off and sees only what the station saw.
 """
 
 import math
-import time
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -14,12 +13,13 @@ import rerun as rr
 
 from base_station.recording import columns as col
 from base_station.recording import palette, scene, streams
+from base_station.recording.fleet_rows import body
 from base_station.recording.outlets import Channel, Inline, Queued
 from base_station.recording.trails import Trails
 from hil.scenario import Scenario
 
-CONTACT_M_PER_SQRT_NS = 0.12  # the area of a contact's spot goes with its impulse
-CONTACT_M = (0.05, 0.4)  # smallest and largest spot
+CONTACT_M_PER_SQRT_NS = 0.06  # the area of a contact's spot goes with its impulse
+CONTACT_M = (0.03, 0.3)  # smallest and largest spot
 
 
 class TruthRecorder:
@@ -75,21 +75,31 @@ class TruthWriter:
     def __init__(self, stream: Any, scenario: Scenario, period_s: float) -> None:
         self._stream = stream
         self._batch = col.Batch(stream, period_s)
-        self._names = {v.sysid: v.name for v in scenario.fleet}
+        self._radii_m = {v.sysid: v.frame.radius_m for v in scenario.fleet}
         self._trails = Trails()
-        for vehicle in scenario.fleet:
-            _style(stream, vehicle.name, vehicle.frame.radius_m)
+        radii_m = list(self._radii_m.values())
+        scene.style_bodies(stream, "/truth/fleet", radii_m, palette.TRUTH, solid=False)
+        stream.log("/truth/trail", rr.LineStrips3D.from_fields(radii=0.01), static=True)
 
     def truth(self, time_s: float, vehicles: Mapping[int, tuple[float, float, float]]) -> None:
         self._batch.tick(time_s)
-        for sysid, (north_m, east_m, yaw_rad) in vehicles.items():
-            name = self._names[sysid]
-            self._batch.add(f"/truth/fleet/{name}", col.POSES, (east_m, north_m, yaw_rad))
-            if step := self._trails.step(name, scene.at(north_m, east_m, scene.TRUTH_Z_M)):
-                self._batch.add(f"/truth/trail/{name}", col.SEGMENTS, step)
+        bodies, steps = [], []
+        for sysid, radius_m in self._radii_m.items():
+            north_m, east_m, yaw_rad = vehicles[sysid]
+            bodies.append(body((north_m, east_m), yaw_rad, radius_m, scene.TRUTH_Z_M))
+            place = scene.at(north_m, east_m, scene.TRUTH_Z_M)
+            if step := self._trails.step(sysid, place, palette.TRUTH):
+                steps.append(step)
+        self._batch.add("/truth/fleet", col.BODIES, bodies)
+        if steps:
+            self._batch.add("/truth/trail", col.SEGMENTS, steps)
 
     def contact(
-        self, time_s: float, bodies: tuple[str, str], point_m: tuple[float, float], impulse_ns: float
+        self,
+        time_s: float,
+        bodies: tuple[str, str],
+        point_m: tuple[float, float],
+        impulse_ns: float,
     ) -> None:
         smallest, largest = CONTACT_M
         radius_m = CONTACT_M_PER_SQRT_NS * math.sqrt(max(0.0, impulse_ns))
@@ -98,32 +108,20 @@ class TruthWriter:
             radii=min(largest, max(smallest, radius_m)),
             colors=palette.TRUTH,
             labels=f"{impulse_ns:.1f} N s",
+            show_labels=False,  # on hovering; else they cover the bodies
         )
-        self._set_time(time_s)
+        col.set_time(self._stream, time_s)
         self._stream.log("/truth/contacts", spot)
         text = f"contact of {bodies[0]} and {bodies[1]}: {impulse_ns:.2f} N s"
         self._stream.log("/truth/contact_log", rr.TextLog(text, level="DEBUG"))
 
     def fault(self, time_s: float, text: str) -> None:
-        self._set_time(time_s)
-        self._stream.log("/truth/faults", rr.TextLog(text, level="ERROR"))
+        col.set_time(self._stream, time_s)
+        self._stream.log("/truth/faults", rr.TextLog(f"fault (truth): {text}", level="ERROR"))
 
     def close(self) -> None:
         self._batch.send()
         self._stream.disconnect()
-
-    def _set_time(self, time_s: float) -> None:
-        self._stream.set_time(col.SIM_TIME, duration=time_s)
-        self._stream.set_time(col.WALL_TIME, timestamp=time.time())
-
-
-def _style(stream: Any, name: str, radius_m: float) -> None:
-    ring = rr.LineStrips3D(
-        [scene.circle(0.0, 0.0, radius_m, scene.TRUTH_Z_M)], colors=palette.TRUTH, radii=0.015
-    )
-    stream.log(f"/truth/fleet/{name}", ring, static=True)
-    trail = rr.LineStrips3D.from_fields(colors=palette.TRUTH, radii=0.01)
-    stream.log(f"/truth/trail/{name}", trail, static=True)
 
 
 def _file_writer(path: Path, run_id: str, scenario: Scenario) -> TruthWriter:

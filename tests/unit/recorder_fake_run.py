@@ -241,9 +241,7 @@ def plan_alpha() -> PlanReady:
 
 
 def plan_beta() -> PlanReady:
-    return PlanReady(
-        2, "beta", (Training("ppo-mlp", "tuned", 0, True, 40_000, 7.6, curve(97.0)),)
-    )
+    return PlanReady(2, "beta", (Training("ppo-mlp", "tuned", 0, True, 40_000, 7.6, curve(97.0)),))
 
 
 def contacts() -> list[tuple[float, tuple[str, str], tuple[float, float], float]]:

@@ -1,0 +1,98 @@
+"""The vehicles as the station sees them, tick by tick."""
+
+import math
+from collections.abc import Callable, Sequence
+
+from base_station.recording import columns as col
+from base_station.recording import scene
+from base_station.recording.palette import vehicle_color
+from base_station.recording.trails import Trails
+from base_station.records import Snapshot, VehicleSnapshot
+from hil.frames import body_to_ned, ned_to_wgs84
+from hil.scenario import StationView
+
+SLOW_S = 1.0  # between rows of what hardly changes
+
+
+class FleetRows:
+    """Series of the whole fleet are one entity each, vehicles in fleet order: cheap to write."""
+
+    def __init__(self, batch: col.Batch, view: StationView) -> None:
+        self._batch, self._goals = batch, {m.sysid: m.goal for m in view.fleet}
+        self._radii_m = {m.sysid: m.frame.radius_m for m in view.fleet}
+        self._reached_m = view.limits.goal_radius_m
+        self._origin = view.origin.origin()
+        self._trails = Trails()
+        self._slow_s = -math.inf
+        self._driven = False
+
+    def add(self, snapshot: Snapshot) -> None:
+        vehicles = snapshot.vehicles
+        self._series("residual/north", vehicles, lambda v: v.residual[0])
+        self._series("residual/east", vehicles, lambda v: v.residual[1])
+        self._series("alarm/north", vehicles, lambda v: v.cusum[0])
+        self._series("alarm/east", vehicles, lambda v: v.cusum[1])
+        self._series("speed", vehicles, lambda v: math.hypot(*v.velocity_mps))
+        self._series("goal_distance", vehicles, self._goal_distance_m)
+        for vehicle in vehicles:
+            if vehicle.motor_outputs:
+                self._batch.add(f"/motors/{vehicle.name}", col.SCALARS, vehicle.motor_outputs)
+        slow = snapshot.time_s - self._slow_s >= SLOW_S
+        if slow:
+            self._slow_s = snapshot.time_s
+            self._slow(snapshot)
+        if all(known(*v.reported_m) for v in vehicles):  # colours go by place in the fleet
+            self._places(vehicles, slow)
+
+    def _slow(self, snapshot: Snapshot) -> None:
+        self._series("battery", snapshot.vehicles, lambda v: v.battery_percent)
+        self._series("satellites", snapshot.vehicles, lambda v: v.gps_satellites)
+        self._batch.add("/alarm/threshold", col.SCALARS, snapshot.threshold)
+        self._batch.add("/goal_distance/radius", col.SCALARS, self._reached_m)
+
+    def _places(self, vehicles: Sequence[VehicleSnapshot], slow: bool) -> None:
+        bodies = [body(v.reported_m, v.yaw_rad, self._radii_m[v.sysid], 0.0) for v in vehicles]
+        self._batch.add("/fleet", col.BODIES, bodies)
+        steps = [
+            self._trails.step(v.sysid, scene.at(*v.reported_m), vehicle_color(k))
+            for k, v in enumerate(vehicles)
+        ]
+        if moved := [step for step in steps if step]:
+            self._batch.add("/trail", col.SEGMENTS, moved)
+        arrows = [
+            (*scene.at(*v.reported_m, scene.ARROW_Z_M), *scene.at(*v.setpoint_mps))
+            for v in vehicles
+            if v.setpoint_mps and any(v.setpoint_mps) and known(*v.setpoint_mps)
+        ]
+        if arrows or self._driven:
+            self._batch.add("/setpoint", col.ARROWS, arrows)
+        self._driven = bool(arrows)
+        if slow:
+            places = [ned_to_wgs84(*v.reported_m, self._origin) for v in vehicles]
+            self._batch.add("/map/fleet", col.GEO_POINTS, places)
+
+    def _goal_distance_m(self, vehicle: VehicleSnapshot) -> float:
+        goal = self._goals[vehicle.sysid]
+        return math.dist((goal.north_m, goal.east_m), vehicle.reported_m)
+
+    def _series(
+        self,
+        quantity: str,
+        vehicles: Sequence[VehicleSnapshot],
+        value: Callable[[VehicleSnapshot], float],
+    ) -> None:
+        """NaN leaves a gap in a vehicle's line."""
+        self._batch.add(f"/{quantity}", col.SCALARS, [value(v) for v in vehicles])
+
+
+def body(
+    place_m: tuple[float, float], yaw_rad: float, radius_m: float, z_m: float
+) -> tuple[float, ...]:
+    """A row of `BODIES`; a heading that is not known points north."""
+    north, east = body_to_ned(radius_m, 0.0, yaw_rad if known(yaw_rad) else 0.0)
+    nose = scene.at(place_m[0] + north, place_m[1] + east, z_m + scene.DISC_M)
+    return (*scene.at(*place_m, z_m), *nose)
+
+
+def known(*values: float) -> bool:
+    return all(map(math.isfinite, values))

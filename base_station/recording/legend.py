@@ -1,0 +1,53 @@
+"""The legend beside the arena: what is drawn how, so that the plane explains itself."""
+
+from typing import Any
+
+import rerun as rr
+
+from base_station.hypotheses import UNKNOWN
+from base_station.recording.palette import TRUTH, WHITE, hypothesis_color, vehicle_color
+from base_station.recording.scene import DISC_M, GROUND_Z_M, at, circle, hypotheses
+from hil.scenario import StationView
+
+ROWS = 8  # more do not fit beside the arena
+MARGIN = 0.17  # of the arena's width, between it and the middle of an entry
+SIZE = 0.13  # radius of a sign, of the distance between two
+
+
+def log_legend(stream: Any, view: StationView) -> None:
+    """Vehicles and set-points to the west of the arena, truth and twins to the east."""
+    arena = view.arena
+    margin_m = MARGIN * (arena.east_max_m - arena.east_min_m)
+    west_m, east_m = arena.east_min_m - margin_m, arena.east_max_m + margin_m
+    pitch_m = (arena.north_max_m - arena.north_min_m) / ROWS
+    norths_m = [arena.north_max_m - pitch_m * (row + 0.3) for row in range(ROWS)]
+    size_m = SIZE * pitch_m
+
+    fleet = view.fleet[: ROWS - 1]
+    discs = rr.Cylinders3D(
+        centers=[at(north_m, west_m, GROUND_Z_M) for north_m in norths_m[: len(fleet)]],
+        radii=size_m,
+        lengths=DISC_M,
+        colors=[vehicle_color(k) for k in range(len(fleet))],
+        fill_mode="solid",
+        labels=[m.name for m in fleet],
+    )
+    stream.log("/plane/legend/reported", discs, static=True)
+
+    arrow = rr.Arrows3D(
+        origins=[at(norths_m[len(fleet)], west_m - size_m, GROUND_Z_M)],
+        vectors=[at(0.0, 2.0 * size_m)],
+        colors=WHITE,
+        radii=0.03,
+        labels="ordered speed",
+    )
+    stream.log("/plane/legend/setpoint", arrow, static=True)
+
+    twins = [name for name in hypotheses(view) if name != UNKNOWN][: ROWS - 1]
+    rings = rr.LineStrips3D(
+        [circle(n, east_m, size_m, GROUND_Z_M) for n in norths_m[: len(twins) + 1]],
+        colors=[TRUTH, *map(hypothesis_color, twins)],
+        radii=0.025,
+        labels=["truth", *(f"if {name}" for name in twins)],
+    )
+    stream.log("/plane/legend/rings", rings, static=True)

@@ -1,0 +1,89 @@
+"""What each hypothesis believes, tick by tick: its ghost fleet, its evidence, its posterior."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from base_station.hypotheses import UNKNOWN
+from base_station.recording import columns as col
+from base_station.recording import scene
+from base_station.recording.palette import hypothesis_color
+from base_station.recording.trails import Trails
+from base_station.records import TwinSnapshot
+from hil.scenario import StationView
+
+SIGMAS = 2.0  # half size of a spot
+MIN_SPOT_M = 0.03  # so that a certain prediction is still seen
+ELSEWHERE_M = 0.02  # a twin's report is drawn where it is off its body, or uncertain
+FLOOR_NATS = -50.0  # further behind the best makes no difference
+
+
+class TwinRows:
+    """One entity per hypothesis in space; posterior and evidence of all in one entity each."""
+
+    def __init__(self, batch: col.Batch, stream: Any, view: StationView) -> None:
+        self._batch, self._stream = batch, stream
+        self._radii_m = [m.frame.radius_m for m in view.fleet]
+        self._order = scene.hypotheses(view)
+        self._trails = Trails()
+        self._styled: set[str] = set()
+        self.shown: tuple[str, ...] = ()
+
+    def add(self, twins: Sequence[TwinSnapshot]) -> None:
+        names = tuple(t.hypothesis for t in twins)
+        for gone in sorted(set(self.shown) - set(names)):
+            self._batch.add(f"/twins/{gone}/body", col.RINGS, ())
+            self._batch.add(f"/twins/{gone}/report", col.SPOTS, ())
+            self._trails.forget(gone)
+        self.shown = names
+        for twin in twins:
+            self._ghosts(twin)
+        if twins:
+            self._belief(twins)
+
+    def _belief(self, twins: Sequence[TwinSnapshot]) -> None:
+        best = max(t.log_likelihood for t in twins)
+        posterior = {t.hypothesis: t.posterior for t in twins}
+        evidence = {t.hypothesis: t.log_likelihood for t in twins}
+        behind = {name: max(FLOOR_NATS, value - best) for name, value in evidence.items()}
+        if len(twins) > 1:  # 'unknown' has no twin; what the others leave is its share
+            posterior.setdefault(UNKNOWN, max(0.0, 1.0 - sum(posterior.values())))
+        self._series("posterior", posterior)
+        self._series("log_likelihood", evidence)
+        self._series("behind_best", behind)
+
+    def _series(self, quantity: str, values: dict[str, float]) -> None:
+        row = [values.get(name, np.nan) for name in self._order]
+        self._batch.add(f"/belief/{quantity}", col.SCALARS, row)
+
+    def _ghosts(self, twin: TwinSnapshot) -> None:
+        name, root = twin.hypothesis, f"/twins/{twin.hypothesis}"
+        if not (np.isfinite(twin.true_m).all() and np.isfinite(twin.report_m).all()):
+            return
+        if name not in self._styled:
+            self._styled.add(name)
+            scene.style_twin(self._stream, name, self._radii_m)
+        bodies = [scene.at(n, e, scene.TWIN_Z_M) for n, e in twin.true_m.tolist()]
+        self._batch.add(f"{root}/body", col.RINGS, bodies)
+        self._batch.add(f"{root}/report", col.SPOTS, _spots(twin))
+        color = hypothesis_color(name)
+        steps = [self._trails.step((name, k), place, color) for k, place in enumerate(bodies)]
+        if moved := [step for step in steps if step]:
+            self._batch.add(f"{root}/trail", col.SEGMENTS, moved)
+
+
+def _spots(twin: TwinSnapshot) -> list[tuple[float, ...]]:
+    """Where the station would receive a vehicle to be, give or take."""
+    spots: list[tuple[float, ...]] = []
+    rows = zip(twin.true_m.tolist(), twin.report_m.tolist(), twin.sigma_m.tolist(), strict=True)
+    for (true_n, true_e), (north, east), (sigma_n, sigma_e) in rows:
+        elsewhere = abs(north - true_n) + abs(east - true_e) > ELSEWHERE_M
+        if elsewhere or sigma_n > 0.0 or sigma_e > 0.0:
+            half = scene.at(_half_m(sigma_n), _half_m(sigma_e), scene.RING_M)
+            spots.append((*scene.at(north, east, scene.REPORT_Z_M), *half))
+    return spots
+
+
+def _half_m(sigma_m: float) -> float:
+    return max(MIN_SPOT_M, SIGMAS * sigma_m)  # the order also turns NaN into the minimum
