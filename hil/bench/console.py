@@ -105,7 +105,7 @@ class Console:
         sign, style = _STYLES.get(event.kind, (" ", "dim"))
         line = Text(f"{event.time_s:7.1f} s  ", style="dim")
         line.append(f"  {sign} ", style=style)
-        line.append(event.text, style=style if event.kind != "text" else "")
+        line.append(event.text, style=style)
         self._out.print(line, soft_wrap=False)
 
     def progress(self, progress: Progress) -> None:

@@ -40,6 +40,7 @@ class RunLog:
         self._struck: list[Struck] = []
         self.outcome: Outcome | None = None
         self.tick_s: float | None = None  # fleet time of the station's last tick
+        self.learning = False  # whether it was in a phase of learning then
 
     def __enter__(self) -> "RunLog":
         return self
@@ -68,6 +69,7 @@ class RunLog:
         match line:
             case Tick():
                 self.tick_s = line.time_s
+                self.learning = line.phase.startswith("plan_")
                 self._console.tick(line)
             case StationEvent():
                 self._write_event(line)

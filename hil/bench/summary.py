@@ -10,6 +10,8 @@ from rich.text import Text
 from hil.bench.result import COMPLETED
 from hil.scenario import Scenario
 
+SHOWN_FROM = 0.0005  # what rounds to a posterior of 0.000 is not shown
+
 
 def summary(tree: dict[str, Any], scenario: Scenario) -> RenderableType:
     """Verdict and truth on top, goals and phases side by side below."""
@@ -53,11 +55,11 @@ def _verdict(tree: dict[str, Any], names: dict[str, str]) -> RenderableType:
 
 def _posterior(posterior: dict[str, float]) -> str:
     ranked = sorted(posterior.items(), key=lambda item: -item[1])[:3]
-    return "  ".join(f"{name} {p:.3f}" for name, p in ranked)
+    return "  ".join(f"{name} {p:.3f}" for name, p in ranked if p >= SHOWN_FROM)
 
 
 def _goals(tree: dict[str, Any], names: dict[str, str]) -> RenderableType:
-    table = _table("goal of", ("declared", "left"), ("at", "right"), ("true distance", "right"))
+    table = _table("goal of", ("declared", "left"), ("at", "right"), ("true", "right"))
     for sysid, goal in tree["goals"].items():
         time_s = goal["time_s"]
         table.add_row(
@@ -76,7 +78,7 @@ def _times(tree: dict[str, Any]) -> RenderableType:
     trainings: dict[str, list[str]] = {}
     for t in tree["trainings"]:
         again = f", {t['restarts']} restarts" if t["restarts"] else ""
-        words = f"{t['planner']} {t['timesteps']:,} steps, {t['wall_s']:.1f} s{again}"
+        words = f"{t['wall_s']:.1f} s, {t['timesteps'] / 1000:.0f}k steps{again}"
         trainings.setdefault(f"plan_{t['kind']}", []).append(words)
     for p in tree["phases"]:
         learnt = "\n".join(trainings.get(p["phase"], []))

@@ -7,12 +7,13 @@ from dataclasses import dataclass, field
 
 from hil.bench.folders import SCENARIO_FILE, VIEW_FILE, Folders
 from hil.bench.injector import Breaker
+from hil.bench.leash import Leash
 from hil.bench.lines import STATION, parse_station_line
 from hil.bench.onsets import Onsets
 from hil.bench.ports import PORTS_PER_VEHICLE
 from hil.bench.processes import Child, Children, Command
 from hil.bench.runlog import RunLog
-from hil.bench.watchdog import Watchdog, leash_s
+from hil.bench.watchdog import Watchdog
 from hil.link import UdpLink
 from hil.scenario import Scenario
 from hil.world.truth import TruthRecord, parse_line
@@ -62,7 +63,7 @@ class _Run:
         self._log, self._onsets = log, onsets
         self._breaker = Breaker(scenario, lambda fault: log.struck(fault, log.world_s))
         self._injector_links: dict[int, UdpLink] = {}
-        self._leash_s = 0.0
+        self._leash = Leash(options.speed)
 
     def go(self) -> None:
         with ExitStack() as stack:
@@ -120,16 +121,12 @@ class _Run:
     def _drive(self, children: Children, world: Child) -> None:
         watchdog = Watchdog(self._options.speed, time.monotonic())
         while self._log.outcome is None:
-            self._lengthen_leash(world)
+            now_s = time.monotonic()
+            if self._leash.lengthen(self._log.tick_s, self._log.learning, now_s):
+                world.send(f"until {self._leash.until_s:.6f}")
             children.pump(POLL_S)
             self._inject()
-            watchdog.check(self._log.world_s, self._log.tick_s, time.monotonic())
-
-    def _lengthen_leash(self, world: Child) -> None:
-        until_s = leash_s(self._log.tick_s)
-        if until_s > self._leash_s:
-            self._leash_s = until_s
-            world.send(f"until {until_s:.6f}")
+            watchdog.check(self._log.world_s, self._leash.until_s, self._log.tick_s, now_s)
 
     def _inject(self) -> None:
         now_s = time.monotonic()

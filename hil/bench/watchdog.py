@@ -5,13 +5,6 @@ from hil.world.simulation import TRUTH_HZ
 
 HANG_S = 6.0
 FIRST_TICK_WITHIN_S = 30.0
-LEASH_S = 0.5  # how far the world may be ahead of the station
-FIRST_LEASH_S = 3.0  # and before the station has ticked at all
-
-
-def leash_s(tick_s: float | None) -> float:
-    """World time that must not be passed, given the station's last tick."""
-    return FIRST_LEASH_S if tick_s is None else tick_s + LEASH_S
 
 
 class Watchdog:
@@ -22,15 +15,15 @@ class Watchdog:
         self._last: tuple[float, float | None] = (0.0, None)
         self._since_s = now_s
 
-    def check(self, world_s: float, tick_s: float | None, now_s: float) -> None:
-        """Raises ProcessDiedError naming who hangs."""
+    def check(self, world_s: float, leash_s: float, tick_s: float | None, now_s: float) -> None:
+        """Raises ProcessDiedError naming who hangs; `leash_s` is where the world has to wait."""
         if (world_s, tick_s) != self._last:
             self._last, self._since_s = (world_s, tick_s), now_s
             return
         patience_s = max(self._patience_s, FIRST_TICK_WITHIN_S if tick_s is None else 0.0)
         if now_s - self._since_s <= patience_s:
             return
-        world_waits = world_s + 1.0 / TRUTH_HZ >= leash_s(tick_s) - 1e-6
+        world_waits = world_s + 1.0 / TRUTH_HZ >= leash_s - 1e-6
         who, other = ("base-station", "world") if world_waits else ("world", "base-station")
         raise ProcessDiedError(
             f"{who} hangs: nothing from it for {patience_s:.0f} s while the {other} waits for it"

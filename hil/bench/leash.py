@@ -1,0 +1,30 @@
+"""How far the world may go before the station has caught up (pure)."""
+
+LEASH_S = 0.5  # ahead of the station's last tick
+FIRST_LEASH_S = 3.0  # before the station has ticked at all
+
+
+class Leash:
+    """World time not to pass. `now_s` is wall time; `speed` is the world's, 0 as fast as possible.
+
+    While the station learns, a world without a pace of its own keeps to real time: learning needs
+    the processor more, and nobody waits for the world.
+    """
+
+    def __init__(self, speed: float) -> None:
+        self.until_s = 0.0
+        self._pace = speed or 1.0
+        self._learning: tuple[float, float] | None = None  # wall and world time of its beginning
+
+    def lengthen(self, tick_s: float | None, learning: bool, now_s: float) -> bool:
+        """Take the station's last tick; whether the leash is longer now."""
+        until_s = FIRST_LEASH_S if tick_s is None else tick_s + LEASH_S
+        if not learning:
+            self._learning = None
+        else:
+            self._learning = self._learning or (now_s, until_s)
+            since_s, from_s = self._learning
+            until_s = min(until_s, from_s + (now_s - since_s) * self._pace)
+        longer = until_s > self.until_s
+        self.until_s = max(until_s, self.until_s)
+        return longer
