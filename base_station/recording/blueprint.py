@@ -13,9 +13,10 @@ from hil.scenario import Arena, StationView
 TABS = ("Overview", "Diagnosis", "Learning", "Mission", "Map", "Log")
 REALITY = ("/plane/**", "/fleet", "/trail", "/setpoint", "/truth/**")
 TWINS, PLAN = "/twins/**", "/plan/**"
-DARK, GRID = (14, 16, 20), (255, 255, 255, 20)
+PREDICTED = ("/plane/**", "- /plane/legend/**", "/fleet", PLAN)
+DARK, GRID = (14, 16, 20), (255, 255, 255, 12)
 SHORT_S, TUBE_S, CONTACT_S, WHOLE_S = 15.0, 4.0, 3.0, 24 * 3600.0
-EYE_HEIGHTS = 1.08  # height of the eye, over the side of what it sees
+EYE_HEIGHTS = 1.04  # height of the eye, over the side of what it sees
 ASPECT = 1.7  # width of a view of the plane, over its height
 MOTOR_TABS = 6  # vehicles whose motors get a plot
 
@@ -40,7 +41,7 @@ def blueprint(view: StationView) -> Any:
 
 
 def _overview(view: StationView) -> Any:
-    plane = _plane(view, "Plane", (*REALITY, TWINS), SHORT_S)
+    plane = _plane(view, "Plane", (*REALITY, TWINS), SHORT_S, aspect=2.1)
     left = rrb.Vertical(plane, _phases(), row_shares=[5, 3])
     right = rrb.Vertical(
         _posterior(), _alarm("north"), _alarm("east"), _events(), row_shares=[4, 3, 3, 5]
@@ -65,7 +66,7 @@ def _diagnosis(view: StationView) -> Any:
 def _learning(view: StationView) -> Any:
     over_time = rrb.Vertical(*(_curves(kind) for kind in ("alpha", "beta")))
     over_steps = rrb.Vertical(*(_bars(kind) for kind in ("alpha", "beta")))
-    plan = _plane(view, "Plan alpha, predicted", ("/plane/**", "/fleet", PLAN), aspect=0.75)
+    plan = _plane(view, "Plan alpha, predicted", PREDICTED, aspect=0.8)
     return rrb.Horizontal(over_time, over_steps, plan, column_shares=[1, 1, 1.3], name="Learning")
 
 
@@ -114,15 +115,15 @@ def _plane(
         name=f"{name} (seen from above, north up, 1 m grid)",
         background=DARK,
         line_grid=rrb.LineGrid3D(visible=True, spacing=1.0, stroke_width=1.0, color=GRID),
-        eye_controls=_eye(view.arena, aspect),
+        eye_controls=_eye(view.arena, aspect, margins=0.0 if contents is PREDICTED else MARGIN),
         overrides={path: _last(seconds) for path, seconds in shown_s.items()},
     )
 
 
-def _eye(arena: Arena, aspect: float) -> Any:
+def _eye(arena: Arena, aspect: float, margins: float) -> Any:
     east_m = (arena.east_min_m + arena.east_max_m) / 2
     north_m = (arena.north_min_m + arena.north_max_m) / 2
-    width_m = (1.0 + 4.0 * MARGIN) * (arena.east_max_m - arena.east_min_m)
+    width_m = (1.1 + 3.6 * margins) * (arena.east_max_m - arena.east_min_m)
     side_m = max(arena.north_max_m - arena.north_min_m, width_m / aspect)
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
@@ -154,14 +155,15 @@ def _residual(axis: str) -> Any:
 
 
 def _curves(kind: str) -> Any:
-    return _plot(f"Learning {kind}: mean reward as it grew", f"/learning/{kind}/**", legend=True)
+    name, low = f"Learning {kind}: mean reward as it grew", rrb.Corner2D.RightBottom
+    return _plot(name, f"/learning/{kind}/**", legend=True, corner=low)
 
 
 def _bars(kind: str) -> Any:
     return rrb.BarChartView(
         origin="/",
         contents=[f"/curves/{kind}/**"],
-        name=f"Learning {kind}: mean reward over steps",
+        name=f"Learning {kind}: accepted, reward over steps",
         plot_legend=rrb.PlotLegend(visible=False),
     )
 
@@ -181,6 +183,7 @@ def _plot(
     paths: str | Iterable[str],
     legend: bool = False,
     y: tuple[float, float] | None = None,
+    corner: rrb.Corner2D = rrb.Corner2D.RightTop,
 ) -> Any:
     roots = [paths] if isinstance(paths, str) else paths
     return rrb.TimeSeriesView(
@@ -189,5 +192,5 @@ def _plot(
         name=name,
         axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
         axis_y=rrb.ScalarAxis(range=y) if y else None,
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend),
+        plot_legend=rrb.PlotLegend(corner, visible=legend),
     )

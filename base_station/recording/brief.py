@@ -16,7 +16,7 @@ LEGEND = """\
 | white ring | where it **truly** is; the station never sees this (root `truth`) |
 | coloured ring | where it would be **if that hypothesis were right**: its twin |
 | coloured spot | what the station would then **receive**, two standard deviations wide |
-| white arrow | commanded velocity, 1 m long for 1 m/s |
+| white arrow | where its orders would take it in 2 s |
 | circle with a dot | goal, and how near counts as reached |
 
 One colour per vehicle and one per hypothesis, the same in all views. Broken motors are

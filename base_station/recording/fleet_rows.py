@@ -12,6 +12,7 @@ from hil.frames import body_to_ned, ned_to_wgs84
 from hil.scenario import StationView
 
 SLOW_S = 1.0  # between rows of what hardly changes
+AHEAD_S = 2.0  # a set-point is drawn as the way it leads in this time
 
 
 class FleetRows:
@@ -60,7 +61,7 @@ class FleetRows:
         if moved := [step for step in steps if step]:
             self._batch.add("/trail", col.SEGMENTS, moved)
         arrows = [
-            (*scene.at(*v.reported_m, scene.ARROW_Z_M), *scene.at(*v.setpoint_mps))
+            (*scene.at(*v.reported_m, scene.ARROW_Z_M), *_ahead(*v.setpoint_mps))
             for v in vehicles
             if v.setpoint_mps and any(v.setpoint_mps) and known(*v.setpoint_mps)
         ]
@@ -92,6 +93,10 @@ def body(
     north, east = body_to_ned(radius_m, 0.0, yaw_rad if known(yaw_rad) else 0.0)
     nose = scene.at(place_m[0] + north, place_m[1] + east, z_m + scene.DISC_M)
     return (*scene.at(*place_m, z_m), *nose)
+
+
+def _ahead(north_mps: float, east_mps: float) -> scene.Point3:
+    return scene.at(AHEAD_S * north_mps, AHEAD_S * east_mps)
 
 
 def known(*values: float) -> bool:

@@ -4,7 +4,7 @@ from typing import Any
 
 import rerun as rr
 
-from base_station.hypotheses import UNKNOWN
+from base_station.hypotheses import NONE, UNKNOWN
 from base_station.recording.palette import TRUTH, WHITE, hypothesis_color, vehicle_color
 from base_station.recording.scene import DISC_M, GROUND_Z_M, at, circle, hypotheses
 from hil.scenario import StationView
@@ -12,6 +12,7 @@ from hil.scenario import StationView
 ROWS = 8  # more do not fit beside the arena
 MARGIN = 0.17  # of the arena's width, between it and the middle of an entry
 SIZE = 0.13  # radius of a sign, of the distance between two
+WELL = "if all is well"
 
 
 def log_legend(stream: Any, view: StationView) -> None:
@@ -30,7 +31,6 @@ def log_legend(stream: Any, view: StationView) -> None:
         lengths=DISC_M,
         colors=[vehicle_color(k) for k in range(len(fleet))],
         fill_mode="solid",
-        labels=[m.name for m in fleet],
     )
     stream.log("/plane/legend/reported", discs, static=True)
 
@@ -38,8 +38,7 @@ def log_legend(stream: Any, view: StationView) -> None:
         origins=[at(norths_m[len(fleet)], west_m - size_m, GROUND_Z_M)],
         vectors=[at(0.0, 2.0 * size_m)],
         colors=WHITE,
-        radii=0.03,
-        labels="ordered speed",
+        radii=0.04,
     )
     stream.log("/plane/legend/setpoint", arrow, static=True)
 
@@ -48,6 +47,22 @@ def log_legend(stream: Any, view: StationView) -> None:
         [circle(n, east_m, size_m, GROUND_Z_M) for n in norths_m[: len(twins) + 1]],
         colors=[TRUTH, *map(hypothesis_color, twins)],
         radii=0.025,
-        labels=["truth", *(f"if {name}" for name in twins)],
     )
     stream.log("/plane/legend/rings", rings, static=True)
+
+    texts_west = [*((m.name, vehicle_color(k)) for k, m in enumerate(fleet)), ("ordered", WHITE)]
+    texts_east = [("truth", TRUTH), *((_if(name), hypothesis_color(name)) for name in twins)]
+    rows = [(west_m, k, *text) for k, text in enumerate(texts_west)]
+    rows += [(east_m, k, *text) for k, text in enumerate(texts_east)]
+    below_m = 1.2 * size_m  # the viewer writes a label just below its point
+    texts = rr.Points3D(
+        [at(norths_m[k] - below_m, place_m, GROUND_Z_M) for place_m, k, _, _ in rows],
+        colors=[color for *_, color in rows],
+        labels=[text for _, _, text, _ in rows],
+        radii=0.001,
+    )
+    stream.log("/plane/legend/texts", texts, static=True)
+
+
+def _if(hypothesis: str) -> str:
+    return WELL if hypothesis == NONE else f"if {hypothesis}"

@@ -19,7 +19,8 @@ WHITE: Rgb = (255, 255, 255)
 BLACK: Rgb = (0, 0, 0)
 DIM: Rgb = (110, 116, 126)
 LIGHT_GREY: Rgb = (200, 200, 200)
-GREY: Rgb = (130, 130, 130)
+GREY: Rgb = (150, 150, 150)
+DARK_GREY: Rgb = (100, 100, 100)
 
 TRUTH = WHITE
 THRESHOLD = WHITE
@@ -33,8 +34,8 @@ _HYPOTHESES: dict[str, Rgb] = {
     "motor_x_off": ORANGE,
     "gps_east_stuck": PURPLE,
     "gps_north_stuck": BLUE,
-    "none": LIGHT_GREY,
-    "unknown": GREY,
+    "none": GREY,
+    "unknown": DARK_GREY,
 }
 _OTHERS = (VERMILION, PURPLE, ORANGE, BLUE)
 

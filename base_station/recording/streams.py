@@ -9,7 +9,7 @@ import rerun as rr
 
 APPLICATION_ID = "hil"
 VIEWER = "127.0.0.1:9876"
-FILE_PERIOD_S, VIEWER_PERIOD_S = 0.9, 0.2  # how long rows may be kept back
+FILE_PERIOD_S, VIEWER_PERIOD_S = 0.7, 0.2  # how long rows may be kept back
 PROBE_S = 0.3
 
 log = logging.getLogger(__name__)

@@ -4,13 +4,16 @@ Rover 2 does not answer eastwards. Rover 1 drives into it: reality moves as unde
 """
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from base_station.planning.requests import OpenLoopPlan, PlanProgress, PlanReady, Training
+from base_station.recorder import Recorder
+from base_station.recording.truth import TruthRecorder
 from base_station.records import Array, Event, Phase, Snapshot, TwinSnapshot, VehicleSnapshot
 from hil.scenario import Scenario, StationView, load_scenario, station_view
 
@@ -31,6 +34,7 @@ END_S = 60.0
 NAMES = ("motor_x_off", "motor_y_off", "gps_north_stuck", "gps_east_stuck", "none")
 PRIORS = np.array([0.225, 0.225, 0.225, 0.225, 0.05])
 THRESHOLD = 12.0
+PLAN_ALPHA_S, PLAN_BETA_S = 12.9, 28.9
 
 
 def scenario() -> Scenario:
@@ -183,6 +187,10 @@ def _twins(phase: Phase, time_s: float, belief: Belief) -> tuple[TwinSnapshot, .
     return tuple(twins)
 
 
+def turned(vehicle: VehicleSnapshot, yaw_rad: float) -> VehicleSnapshot:
+    return replace(vehicle, yaw_rad=yaw_rad)
+
+
 def events() -> list[Event]:
     posterior = {"motor_y_off": 0.994, "gps_east_stuck": 0.003, "none": 0.001, "unknown": 0.002}
     said = [Event(start_s, "phase", name) for start_s, name in PHASES]
@@ -253,3 +261,25 @@ def contacts() -> list[tuple[float, tuple[str, str], tuple[float, float], float]
             strength = 4.0 if time_s == start_s else 1.2
             found.append((time_s, ("rover_1", "rover_2"), middle, strength))
     return found
+
+
+def tell(recorder: Recorder, story: list[Snapshot]) -> None:
+    """Everything in the order of its time, as the station would."""
+    said: list[tuple[float, Callable[[], None]]] = []
+    said += [(s.time_s, partial(recorder.snapshot, s)) for s in story]
+    said += [(e.time_s, partial(recorder.event, e)) for e in events()]
+    said += [(time_s, partial(recorder.progress, p)) for time_s, p in progress()]
+    said += [(PLAN_ALPHA_S, partial(recorder.plan, plan_alpha()))]
+    said += [(PLAN_BETA_S, partial(recorder.plan, plan_beta()))]
+    for _, call in sorted(said, key=lambda row: row[0]):
+        call()
+
+
+def tell_truth(recorder: TruthRecorder, story: list[Snapshot]) -> None:
+    """The same run, as the bench would."""
+    recorder.fault(0.0, "rover_2: motors 3 and 4 off")
+    for snapshot in story:
+        places = enumerate(truth_at(snapshot.time_s).tolist(), start=1)
+        recorder.truth(snapshot.time_s, {k: (north, east, 0.0) for k, (north, east) in places})
+    for contact in contacts():
+        recorder.contact(*contact)
