@@ -15,7 +15,7 @@ install: $(INSTALLED)
 
 # pip checks each dependency in turn; torch goes first because it is the large one
 $(INSTALLED): pyproject.toml
-	$(PYTHON) -c 'import sys; sys.exit("Python >= 3.11 is needed" * (sys.version_info < (3, 11)))'
+	$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "Python >= 3.11 is needed")'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check "$(TORCH)"
 	$(BIN)/pip install --quiet --disable-pip-version-check -e .
