@@ -71,6 +71,11 @@ class Goals:
         )
 
 
+def places_m(watch: Watch) -> Array:
+    """[V, 2] where the vehicles are believed to be."""
+    return watch.state[:, twin.NORTH : twin.EAST + 1].copy()
+
+
 def belief_of(watch: Watch, view: StationView) -> tuple[Hypothesis, ...]:
     """The one hypothesis that a mission is planned under."""
     return watch.baseline.known[-1:] or (nominal(view.fleet[0].sysid),)
@@ -92,9 +97,19 @@ def can_drive(watch: Watch, view: StationView) -> Flags:
 
 
 def orders(
-    policy: PolicyWeights, watch: Watch, goals: Goals, elapsed_s: float, view: StationView
+    policy: PolicyWeights,
+    watch: Watch,
+    goals: Goals,
+    elapsed_s: float,
+    view: StationView,
+    shake: float,
+    rng: np.random.Generator,
 ) -> Orders:
-    """What the policy wants of the fleet as it is believed to be now."""
+    """What the policy wants of the fleet as it is believed to be now.
+
+    `shake` is the sigma of noise on its action, of the kind it explored with: the mean of a policy
+    can be stuck where its samples are not.
+    """
     observation = beta_observation(
         watch.state[None],
         np.array([goals.delivered]),
@@ -103,5 +118,7 @@ def orders(
         goals.position_m,
         broken(watch) or 0,
     )
-    setpoints = to_setpoints(act(policy, observation), Commands.of_view(view))[0]
+    action = act(policy, observation)
+    action = action + shake * rng.standard_normal(action.shape)
+    setpoints = to_setpoints(action, Commands.of_view(view))[0]
     return Orders(setpoints, np.ones(len(view.fleet), dtype=np.bool_))

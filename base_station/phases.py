@@ -2,9 +2,14 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from base_station.execution import Orders
 from base_station.planning.requests import OpenLoopPlan, PolicyWeights
 from base_station.records import Phase
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -70,12 +75,21 @@ class PlanningBeta:
 
 @dataclass(frozen=True, eq=False)
 class OnMission:
-    """[4] `orders` stand until the next control period."""
+    """[4] `orders` stand until the next control period. `clock_s` is the time zero of the policy.
+
+    `places_m` [V, 2] are where the vehicles were at `moved_s`, when one of them last got anywhere;
+    `stalls` counts how often nobody did, `shaken_until_s` is until when that is answered by noise.
+    """
 
     policy: PolicyWeights
     since_s: float
+    clock_s: float
     orders: Orders
     next_control_s: float
+    places_m: Array
+    moved_s: float
+    stalls: int = 0
+    shaken_until_s: float = 0.0
     name: Phase = "mission"
 
 

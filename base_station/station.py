@@ -52,6 +52,9 @@ EXPERIMENT_MIN_S = 1.0
 CONTACT_GAP_S = 1.0  # two touches of a pair closer in time than this are one
 PLANNABLE_POSTERIOR = 0.005  # explanations less likely than this are not worth a contact
 MAX_MISSION_PLANS = 4
+STALLED_M, STALLED_S = 0.05, 2.0  # who pushes gets further than this
+SHAKE, SHAKE_S = 0.5, 2.0  # sigma of the action, and for how long
+MAX_STALLS = 3
 RETURN_TIMEOUT_S = 40.0
 
 
@@ -411,11 +414,15 @@ class Station:
             self._suspect_the_worst(frame)
             return self._hold()
         answer = self._answers.pop(number, None)
+        assert self.watch is not None
         if answer is not None and answer.policy is None:
             self._stop("no mission plan found")
         elif answer is not None and answer.policy is not None:
             self._say("plan", "plan beta learnt")
-            self._enter(OnMission(answer.policy, frame.time_s, self._hold(), frame.time_s))
+            now_s, places_m = frame.time_s, mission.places_m(self.watch)
+            self._enter(
+                OnMission(answer.policy, now_s, now_s, self._hold(), now_s, places_m, now_s)
+            )
         return self._hold()
 
     def _drive(self, phase: OnMission, frame: Frame) -> Orders:
@@ -427,16 +434,40 @@ class Station:
         if all(self.goals.delivered):
             self._enter(Returning(frame.time_s))
             return self._hold()
-        elapsed_s = frame.time_s - phase.since_s
-        if elapsed_s > self.view.planning.beta_horizon_s:
+        if frame.time_s - phase.since_s > self.view.planning.beta_horizon_s:
             self._plan_mission_again("the plan ran out of time")
             return self._hold()
         if frame.time_s < phase.next_control_s - 1e-6:
             return phase.orders
-        orders = mission.orders(phase.policy, self.watch, self.goals, elapsed_s, self.view)
+        phase = self._unstuck(phase, frame.time_s)
+        if phase.stalls > MAX_STALLS:
+            self._plan_mission_again("nobody gets anywhere")
+            return self._hold()
+        elapsed_s = frame.time_s - phase.clock_s
+        shake = SHAKE if frame.time_s < phase.shaken_until_s else 0.0
+        rng = np.random.default_rng((self.view.station_seed, round(frame.time_s * 1000)))
+        orders = mission.orders(
+            phase.policy, self.watch, self.goals, elapsed_s, self.view, shake, rng
+        )
         next_s = phase.next_control_s + 1.0 / self.view.clock.control_hz
         self.phase = replace(phase, orders=orders, next_control_s=next_s)
         return orders
+
+    def _unstuck(self, phase: OnMission, time_s: float) -> OnMission:
+        """Where nobody gets anywhere, begin anew, and with the noise that the policy learnt with."""
+        assert self.watch is not None
+        places_m = mission.places_m(self.watch)
+        if np.abs(places_m - phase.places_m).max() > STALLED_M:
+            return replace(phase, places_m=places_m, moved_s=time_s)
+        if time_s - phase.moved_s < STALLED_S:
+            return phase
+        return replace(
+            phase,
+            clock_s=time_s,
+            moved_s=time_s,
+            stalls=phase.stalls + 1,
+            shaken_until_s=time_s + SHAKE_S,
+        )
 
     def _deliver(self, frame: Frame) -> None:
         assert self.watch is not None
