@@ -11,7 +11,7 @@ from typing import Any
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import ardupilotmega
 
-from hil.mavlink import requests, services, telemetry
+from hil.mavlink import condition, missions, piloting, requests, services, telemetry
 from hil.mavlink.message import Message
 
 MARKER_V1, MARKER_V2 = 0xFE, 0xFD
@@ -50,7 +50,7 @@ def _messages(*modules: Any) -> dict[int, type[Message]]:
     return {int(c.ID): c for c in classes if issubclass(c, Message) and c is not Message}
 
 
-_TYPED = _messages(telemetry, requests, services)
+_TYPED = _messages(telemetry, condition, requests, piloting, services, missions)
 _LAYOUTS = {
     number: _Layout(m.msgname, Struct(m.unpacker.format), bytes([m.crc_extra]), _TYPED.get(number))
     for number, m in ardupilotmega.mavlink_map.items()

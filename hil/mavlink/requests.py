@@ -190,27 +190,3 @@ class RequestDataStream(Message):
     def to_wire(self) -> tuple[Any, ...]:
         target = (self.target_sysid, self.target_compid)
         return (self.rate_hz, *target, self.stream_id, int(self.start))
-
-
-@dataclass(frozen=True, slots=True)
-class MissionRequestList(Message):
-    """MISSION_REQUEST_LIST. Mission type 0 mission, 1 fence, 2 rally."""
-
-    ID = MessageId.MISSION_REQUEST_LIST
-    target_sysid: int
-    target_compid: int
-    mission_type: int = 0
-
-    @classmethod
-    def from_wire(cls, target_sysid: int, target_compid: int, mission_type: int) -> Self:
-        return cls(target_sysid, target_compid, mission_type)
-
-    def to_wire(self) -> tuple[Any, ...]:
-        return (self.target_sysid, self.target_compid, self.mission_type)
-
-
-@dataclass(frozen=True, slots=True)
-class MissionClearAll(MissionRequestList):
-    """MISSION_CLEAR_ALL."""
-
-    ID = MessageId.MISSION_CLEAR_ALL

@@ -1,4 +1,4 @@
-"""What goes both ways, or answers a request: parameters, commands, time, mission counts."""
+"""What goes both ways, or answers a request: parameters, commands, time, files."""
 
 from dataclasses import dataclass
 from typing import Any, Self
@@ -119,59 +119,6 @@ class MessageInterval(Message):
 
     def to_wire(self) -> tuple[Any, ...]:
         return (self.interval_us, self.message_id)
-
-
-@dataclass(frozen=True, slots=True)
-class MissionCount(Message):
-    """MISSION_COUNT: the answer to a list request, or the start of an upload."""
-
-    ID = MessageId.MISSION_COUNT
-    target_sysid: int
-    target_compid: int
-    count: int
-    mission_type: int = 0
-
-    @classmethod
-    def from_wire(cls, count: int, sysid: int, compid: int, kind: int, *_opaque_id: int) -> Self:
-        return cls(sysid, compid, count, kind)
-
-    def to_wire(self) -> tuple[Any, ...]:
-        return (self.count, self.target_sysid, self.target_compid, self.mission_type)
-
-
-@dataclass(frozen=True, slots=True)
-class MissionAck(Message):
-    """MISSION_ACK; `result` is a `MissionResult`."""
-
-    ID = MessageId.MISSION_ACK
-    target_sysid: int
-    target_compid: int
-    result: int
-    mission_type: int = 0
-
-    @classmethod
-    def from_wire(cls, sysid: int, compid: int, result: int, kind: int, *_opaque_id: int) -> Self:
-        return cls(sysid, compid, result, kind)
-
-    def to_wire(self) -> tuple[Any, ...]:
-        return (self.target_sysid, self.target_compid, self.result, self.mission_type)
-
-
-@dataclass(frozen=True, slots=True)
-class MissionCurrent(Message):
-    """MISSION_CURRENT: the item being driven, and how many there are."""
-
-    ID = MessageId.MISSION_CURRENT
-    seq: int
-    total: int
-
-    @classmethod
-    def from_wire(cls, seq: int, total: int, _state: int, _mode: int, *_ids: int) -> Self:
-        return cls(seq, total)
-
-    def to_wire(self) -> tuple[Any, ...]:
-        state = 1 if self.total == 0 else 2  # MISSION_STATE_NO_MISSION, _NOT_STARTED
-        return (self.seq, self.total, state, 0)
 
 
 @dataclass(frozen=True, slots=True)

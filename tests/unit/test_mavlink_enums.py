@@ -15,6 +15,11 @@ PREFIXES: list[tuple[type[IntEnum | IntFlag], str]] = [
     (mavlink.ParamType, "MAV_PARAM_TYPE_"),
     (mavlink.ParamError, "MAV_PARAM_ERROR_"),
     (mavlink.Capability, "MAV_PROTOCOL_CAPABILITY_"),
+    (mavlink.MissionResult, "MAV_MISSION_"),
+    (mavlink.MissionState, "MISSION_STATE_"),
+    (mavlink.MissionType, "MAV_MISSION_TYPE_"),
+    (mavlink.GlobalFrame, "MAV_FRAME_"),
+    (mavlink.EkfFlag, "EKF_"),
 ]
 RENAMED = {
     "FIX_3D": "GPS_FIX_TYPE_3D_FIX",

@@ -169,6 +169,72 @@ CASES: list[tuple[Message, str, dict[str, Any]]] = [
     (mavlink.MissionClearAll(2, 1, 2), "MISSION_CLEAR_ALL", {"mission_type": 2}),
     (mavlink.MissionCount(2, 1, 9, 0), "MISSION_COUNT", {"count": 9, "target_system": 2}),
     (mavlink.MissionAck(2, 1, 3, 0), "MISSION_ACK", {"type": 3, "target_system": 2}),
+    (mavlink.MissionRequestInt(2, 1, 4, 1), "MISSION_REQUEST_INT", {"seq": 4, "mission_type": 1}),
+    (mavlink.MissionRequest(2, 1, 4, 1), "MISSION_REQUEST", {"seq": 4, "target_component": 1}),
+    (
+        mavlink.MissionItem(
+            2, 1, 3, 6, 16, (1.0, 2.0, 3.0, 4.0), -473977423, 85455945, 5.0, True, False, 2
+        ),
+        "MISSION_ITEM_INT",
+        {"seq": 3, "frame": 6, "command": 16, "param1": 1.0, "param4": 4.0, "x": -473977423}
+        | {"y": 85455945, "z": 5.0, "current": 1, "autocontinue": 0, "mission_type": 2},
+    ),
+    (mavlink.MissionSetCurrent(2, 1, 3), "MISSION_SET_CURRENT", {"seq": 3, "target_system": 2}),
+    (mavlink.MissionItemReached(3), "MISSION_ITEM_REACHED", {"seq": 3}),
+    (
+        mavlink.GlobalSetpoint(2, 1, 1.5, 6, 0, (47.5, -8.5, 3.0), (1.0, -2.0, 0.5), 0.25, -0.5),
+        "SET_POSITION_TARGET_GLOBAL_INT",
+        {"time_boot_ms": 1500, "lat_int": 475000000, "lon_int": -85000000, "alt": 3.0, "vx": 1.0}
+        | {"vy": -2.0, "vz": 0.5, "yaw": 0.25, "yaw_rate": -0.5, "coordinate_frame": 6},
+    ),
+    (
+        mavlink.ManualControl(2, 0.5, -1.0, None, 0.0, 3),
+        "MANUAL_CONTROL",
+        {"x": 500, "y": -1000, "z": 32767, "r": 0, "buttons": 3, "target": 2},
+    ),
+    (
+        mavlink.RcOverride(2, 1, (1500, 65535, 1900, 0, *(65535,) * 4, 7, *(0,) * 9)),
+        "RC_CHANNELS_OVERRIDE",
+        {"chan1_raw": 1500, "chan2_raw": 65535, "chan3_raw": 1900, "chan9_raw": 7},
+    ),
+    (
+        mavlink.RcChannels(1.5, (1500, 1600, 1700, 1800)),
+        "RC_CHANNELS",
+        {"time_boot_ms": 1500, "chancount": 4, "chan4_raw": 1800, "chan5_raw": 65535},
+    ),
+    (
+        mavlink.RawImu(1.5, (0.0, 9.80665, -9.80665), (0.25, -0.5, 0.0), (0.2, 0.0, 0.4)),
+        "RAW_IMU",
+        {"time_usec": 1_500_000, "yacc": 1000, "zacc": -1000, "xgyro": 250, "zmag": 400},
+    ),
+    (
+        mavlink.ScaledImu(1.5, (0.0, 9.80665, -9.80665), (0.25, -0.5, 0.0), (0.2, 0.0, 0.4)),
+        "SCALED_IMU",
+        {"time_boot_ms": 1500, "yacc": 1000, "zacc": -1000, "ygyro": -500, "xmag": 200},
+    ),
+    (
+        mavlink.EkfStatus(0.25, 0.5, 0.125, 0.0, 831),
+        "EKF_STATUS_REPORT",
+        {"velocity_variance": 0.25, "pos_horiz_variance": 0.5, "flags": 831},
+    ),
+    (
+        mavlink.EscTelemetry(
+            (mavlink.Esc(1200, 24.5, 1.5, 30, 40, 7), *(mavlink.Esc(0, 0.0, 0.0, 0, 0, 0),) * 3)
+        ),
+        "ESC_TELEMETRY_1_TO_4",
+        {"rpm": [1200, 0, 0, 0], "voltage": [2450, 0, 0, 0], "current": [150, 0, 0, 0]}
+        | {"totalcurrent": [30, 0, 0, 0], "temperature": [40, 0, 0, 0], "count": [7, 0, 0, 0]},
+    ),
+    (
+        mavlink.VfrHud(1.5, 488.0, -0.25, math.pi / 2, 0.5),
+        "VFR_HUD",
+        {"groundspeed": 1.5, "alt": 488.0, "climb": -0.25, "heading": 90, "throttle": 50},
+    ),
+    (
+        mavlink.FenceStatus(True, 3, 1.5),
+        "FENCE_STATUS",
+        {"breach_time": 1500, "breach_count": 3, "breach_status": 1},
+    ),
     (
         mavlink.FileTransfer(2, 1, bytes(range(251))),
         "FILE_TRANSFER_PROTOCOL",
