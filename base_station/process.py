@@ -50,7 +50,7 @@ def _arguments() -> argparse.Namespace:
         prog="base-station",
         description="Find out what is broken in a fleet, over MAVLink, and finish its mission.",
     )
-    parser.add_argument("view", type=Path, help="station view, as `hil view-of SCENARIO` writes it")
+    parser.add_argument("view", type=Path, help="as `hil station-view SCENARIO` prints it")
     parser.add_argument("--out", type=Path, default=Path("."), help="where logs are written")
     parser.add_argument("--machine", action="store_true", help="JSON lines instead of text")
     parser.add_argument(

@@ -68,6 +68,13 @@ def _check(options: argparse.Namespace) -> int:
     return 0
 
 
+def _station_view(options: argparse.Namespace) -> int:
+    from hil.bench.folders import blind_view
+
+    print(blind_view(load_scenario(options.scenario, options.set)).model_dump_json(indent=2))
+    return 0
+
+
 def _schema(_options: argparse.Namespace) -> int:
     print(json.dumps(Scenario.model_json_schema(), indent=2))
     return 0
@@ -136,6 +143,11 @@ def _parser() -> argparse.ArgumentParser:
 
     check = commands.add_parser("check", parents=[scenario], help="validate a scenario")
     check.set_defaults(command=_check)
+
+    view = commands.add_parser(
+        "station-view", parents=[scenario], help="print what the base station is told"
+    )
+    view.set_defaults(command=_station_view)
 
     schema = commands.add_parser("schema", help="print the JSON schema of scenarios")
     schema.set_defaults(command=_schema)

@@ -6,6 +6,10 @@ from typing import Protocol, Self
 
 Address = tuple[str, int]
 
+# Where processes started by hand meet: ArduPilot's simulator port, QGroundControl's MAVLink port, and
+# one of our own. Vehicle i of the fleet uses base + 10 i.
+PHYSICS_PORT_BASE, MAVLINK_PORT_BASE, INJECTOR_PORT_BASE = 9002, 14550, 15550
+
 
 class Link(Protocol):
     """A non-blocking datagram link with one peer."""

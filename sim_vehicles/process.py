@@ -13,14 +13,13 @@ from pathlib import Path
 from types import FrameType
 
 from hil.errors import HilError, InputError
-from hil.link import UdpLink
+from hil.link import INJECTOR_PORT_BASE, MAVLINK_PORT_BASE, PHYSICS_PORT_BASE, UdpLink
 from hil.physics_link import PhysicsState
 from hil.scenario import Scenario, load_scenario
 from sim_vehicles.physics_end import PhysicsEnd
 from sim_vehicles.vehicle import PortName, Vehicle
 
 REPEAT_AFTER_S = 1.0
-PHYSICS_BASE, MAVLINK_BASE, INJECTOR_BASE = 9002, 14550, 15550
 PORT_STEP = 10
 
 
@@ -53,9 +52,11 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("scenario", type=Path)
     parser.add_argument("--sysid", type=int, required=True, help="which vehicle of the fleet")
     parser.add_argument("--host", help="where world and station are (default: links.host)")
-    parser.add_argument("--physics-port", type=_port, metavar="P", help=_default(PHYSICS_BASE))
-    parser.add_argument("--mavlink-port", type=_port, metavar="P", help=_default(MAVLINK_BASE))
-    parser.add_argument("--injector-port", type=_port, metavar="P", help=_default(INJECTOR_BASE))
+    parser.add_argument("--physics-port", type=_port, metavar="P", help=_default(PHYSICS_PORT_BASE))
+    parser.add_argument("--mavlink-port", type=_port, metavar="P", help=_default(MAVLINK_PORT_BASE))
+    parser.add_argument(
+        "--injector-port", type=_port, metavar="P", help=_default(INJECTOR_PORT_BASE)
+    )
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides")
     parser.add_argument("--seed", type=int, help="the same as --set seed=N")
     return parser
@@ -87,9 +88,9 @@ def ports_of(scenario: Scenario, arguments: argparse.Namespace) -> Ports:
     sysids = [v.sysid for v in scenario.fleet]
     offset = PORT_STEP * sysids.index(arguments.sysid)
     return Ports(
-        arguments.physics_port or (links.physics_port_base or PHYSICS_BASE) + offset,
-        arguments.mavlink_port or (links.mavlink_port_base or MAVLINK_BASE) + offset,
-        arguments.injector_port or (links.injector_port_base or INJECTOR_BASE) + offset,
+        arguments.physics_port or (links.physics_port_base or PHYSICS_PORT_BASE) + offset,
+        arguments.mavlink_port or (links.mavlink_port_base or MAVLINK_PORT_BASE) + offset,
+        arguments.injector_port or (links.injector_port_base or INJECTOR_PORT_BASE) + offset,
     )
 
 

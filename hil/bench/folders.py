@@ -11,12 +11,12 @@ import yaml
 
 from hil.bench.ports import PortBases
 from hil.errors import InputError
+from hil.link import MAVLINK_PORT_BASE
 from hil.scenario import Scenario, StationView, station_view
 
 VIEW_FILE = "view.json"
 SCENARIO_FILE = "scenario.yaml"
 _STATION_STREAM = 0x5354
-_UNUSED_PORTS = PortBases(14_000, 15_000, 16_000)  # in memory nothing is bound
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def pin_ports(scenario: Scenario, ports: PortBases) -> Scenario:
 def blind_view(scenario: Scenario) -> StationView:
     """What the station is told, with a random stream of its own: no seed of the world in it."""
     state = np.random.SeedSequence((scenario.seed, _STATION_STREAM)).generate_state(1)
-    port_base = scenario.links.mavlink_port_base or _UNUSED_PORTS.mavlink
+    port_base = scenario.links.mavlink_port_base or MAVLINK_PORT_BASE
     return station_view(scenario, port_base, int(state[0]) & 0x7FFFFFFF)
 
 

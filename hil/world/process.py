@@ -14,14 +14,13 @@ from types import FrameType
 from typing import TextIO
 
 from hil.errors import InputError, ProcessDiedError
-from hil.link import UdpLink
+from hil.link import PHYSICS_PORT_BASE, UdpLink
 from hil.scenario import Scenario
 from hil.world.pacing import Leash, Pace
 from hil.world.simulation import Advance, Simulation
 from hil.world.truth import contact_line, truth_line
 
 FIRST_FRAMES_WITHIN_S = 30.0
-DEFAULT_PORT = 9002
 _POLL_S = 0.1
 
 
@@ -39,7 +38,7 @@ class WorldOptions:
 def run_world(scenario: Scenario, options: WorldOptions) -> int:
     """Serve until SIGTERM or SIGINT. Raises InputError and ProcessDiedError."""
     host = options.host or scenario.links.host
-    base = options.physics_port or scenario.links.physics_port_base or DEFAULT_PORT
+    base = options.physics_port or scenario.links.physics_port_base or PHYSICS_PORT_BASE
     ports = {v.sysid: base + 10 * i for i, v in enumerate(scenario.fleet)}
     links = {sysid: _bind(host, port) for sysid, port in ports.items()}
     names = {v.sysid: f"{v.name} (sysid {v.sysid}, port {ports[v.sysid]})" for v in scenario.fleet}
