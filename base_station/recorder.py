@@ -61,8 +61,7 @@ class Recorder:
 
     def close(self) -> None:
         """Everything is in the file afterwards. May be called twice."""
-        channels, self._channels = self._channels, []
-        for channel in channels:
+        for channel in self._channels:
             channel.close()
 
     def _tell(self, call: Callable[[Writer], None]) -> None:

@@ -80,15 +80,18 @@ class Channel(Generic[W]):
     def __init__(self, outlet: Inline | Queued, make: Callable[[], W | None]) -> None:
         self.outlet, self._make = outlet, make
         self._writer: W | None = None
+        self._closed = False
         outlet.put(self._open)
 
     def tell(self, call: Callable[[W], None]) -> None:
-        self.outlet.put(lambda: call(self._writer) if self._writer is not None else None)
+        if not self._closed:
+            self.outlet.put(lambda: call(self._writer) if self._writer is not None else None)
 
     def close(self) -> None:
         self.tell(lambda writer: writer.close())
-        if not self.outlet.close():
+        if not self._closed and not self.outlet.close():
             streams.abandon()
+        self._closed = True
 
     def _open(self) -> None:
         self._writer = self._make()

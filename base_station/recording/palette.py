@@ -37,7 +37,7 @@ _HYPOTHESES: dict[str, Rgb] = {
     "none": GREY,
     "unknown": DARK_GREY,
 }
-_OTHERS = (VERMILION, PURPLE, ORANGE, BLUE)
+_FAMILIES = {"motor": (VERMILION, ORANGE), "esc": (VERMILION, ORANGE), "gps": (PURPLE, BLUE)}
 
 _PHASES: dict[str, Rgb] = {  # muted, so that nobody takes a phase for a vehicle or a hypothesis
     "connect": (70, 74, 82),
@@ -67,8 +67,15 @@ def vehicle_color(index: int) -> Rgb:
 
 
 def hypothesis_color(name: str) -> Rgb:
-    """Colour of a hypothesis, by its name, so that it needs no order."""
-    return _HYPOTHESES.get(name) or _OTHERS[sum(name.encode()) % len(_OTHERS)]
+    """Colour of a hypothesis, by its name alone, so that it is the same in every run.
+
+    Those without a colour of their own get a pale one of their family.
+    """
+    if name in _HYPOTHESES:
+        return _HYPOTHESES[name]
+    hues = _FAMILIES.get(name.split("_")[0], (PURPLE, ORANGE))
+    shade, hue = divmod(sum(name.encode()), len(hues))
+    return mix(hues[hue], WHITE, 0.3 + 0.1 * (shade % 5))
 
 
 def mix(a: Rgb, b: Rgb, share_of_b: float) -> Rgb:

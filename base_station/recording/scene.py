@@ -63,10 +63,7 @@ def log_scene(stream: Any, view: StationView) -> None:
     stream.log("/plane/arena", outline, static=True)
     _log_goals(stream, view)
     _style_fleet(stream, view)
-    names = hypotheses(view)
-    colors = [hypothesis_color(name) for name in names]
-    for quantity in PER_HYPOTHESIS:
-        stream.log(f"/belief/{quantity}", _lines(names, colors, 2.0), static=True)
+    style_belief(stream, hypotheses(view))
     stream.log("/alarm/threshold", _lines(["alarm threshold"], [THRESHOLD], 1.0), static=True)
     reached = _lines(["counts as reached"], [THRESHOLD], 1.0)
     stream.log("/goal_distance/radius", reached, static=True)
@@ -89,6 +86,13 @@ def style_bodies(
     stream.log(path, looks, static=True)
     nose = rr.LineStrips3D.from_fields(colors=BLACK if solid else colors, radii=0.025)
     stream.log(path, nose, static=True)
+
+
+def style_belief(stream: Any, names: Sequence[str]) -> None:
+    """A line per hypothesis, in the order of the values."""
+    lines = _lines(names, [hypothesis_color(name) for name in names], 2.0)
+    for quantity in PER_HYPOTHESIS:
+        stream.log(f"/belief/{quantity}", lines, static=True)
 
 
 def style_twin(stream: Any, name: str, radii_m: Sequence[float]) -> None:

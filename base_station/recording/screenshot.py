@@ -4,7 +4,7 @@ import os
 import socket
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -31,8 +31,8 @@ def screenshot(rrd: Path, time_s: float, out_png: Path, view: str | None = None)
 
 
 @contextmanager
-def headless(rrd: Path) -> Iterator["Viewer"]:
-    """A headless viewer with a recording open. Needs a Vulkan driver (`mesa-vulkan-drivers`)."""
+def headless(rrd: Path | None = None) -> Iterator["Viewer"]:
+    """A headless viewer, with a recording open. Needs a Vulkan driver (`mesa-vulkan-drivers`)."""
     port = _free_port()
     width, height = SIZE
     command = [str(Path(rerun_cli.__file__).parent / "rerun"), "--headless", "--bind", "127.0.0.1"]
@@ -45,8 +45,9 @@ def headless(rrd: Path) -> Iterator["Viewer"]:
         env={**os.environ, "CI": "1"},  # otherwise it looks for news on the network
     )
     try:
-        viewer = Viewer(_connect(process, port), time.monotonic())
-        viewer.open(rrd)
+        viewer = Viewer(_connect(process, port), f"127.0.0.1:{port}")
+        if rrd is not None:
+            viewer.open(rrd)
         yield viewer
     finally:
         process.kill()
@@ -56,24 +57,34 @@ def headless(rrd: Path) -> Iterator["Viewer"]:
 class Viewer:
     """Drives one viewer."""
 
-    def __init__(self, client: Any, started_s: float) -> None:
-        self._client, self._started_s = client, started_s
+    def __init__(self, client: Any, address: str) -> None:
+        self._client, self.address = client, address
+        self._started_s = time.monotonic()
 
     def open(self, rrd: Path) -> None:
+        """Show a file."""
         self._client.open(str(rrd.resolve()))
+        self._wait(lambda state: not state.loading, f"{rrd}: not loaded")
+
+    def wait_for(self, run_id: str) -> None:
+        """Until a recording that is streamed in is there and shown."""
+        self._wait(
+            lambda state: any(run_id in str(r) for r in state.recordings) and bool(state.views),
+            f"{run_id}: not heard of",
+        )
+
+    def _wait(self, holds: Callable[[Any], bool], what: str) -> None:
         deadline_s = time.monotonic() + LOAD_S
-        while self._client.get_state().loading:
+        while not holds(self._client.get_state()):
             if time.monotonic() > deadline_s:
-                raise HilError(f"{rrd}: not loaded by the viewer after {LOAD_S:g} s")
+                raise HilError(f"{what} by the viewer after {LOAD_S:g} s")
             time.sleep(POLL_S)
 
     def shoot(self, time_s: float, out_png: Path, view: str | None = None) -> None:
         """A picture at a time; see `screenshot`."""
-        view_id = None
-        if view in TABS or view is None:
-            self._show_tab(view or TABS[0])
-        else:
-            view_id = self._find(view)
+        layout = _Layout(self._client.get_blueprint().blueprint)
+        tab, view_id = layout.find(view or TABS[0])
+        self._client.set_blueprint(layout.with_tab(tab), of="recording")
         self._client.set_time(SIM_TIME, duration=time_s, play_state="paused")
         time.sleep(max(0.0, self._started_s + TOASTS_S - time.monotonic()))
         out_png.write_bytes(self._settled(view_id))
@@ -91,28 +102,49 @@ class Viewer:
             last, now = now, bytes(self._client.take_screenshot(view_id=view_id))
         return now
 
-    def _show_tab(self, name: str) -> None:
-        tree = self._client.get_blueprint().blueprint
-        titles = {
-            path.strip("/"): fields[kind].get("display_name")
-            for path, fields in tree.items()
-            for kind in ("ContainerBlueprint", "ViewBlueprint")
-            if kind in fields
-        }
-        for fields in tree.values():
-            tabs = fields.get("ContainerBlueprint", {})
-            contents = [path.strip("/") for path in tabs.get("contents", ())]
-            if tuple(titles.get(path) for path in contents) == TABS:
-                tabs["active_tab"] = contents[TABS.index(name)]
-        self._client.set_blueprint(tree, of="recording")
 
-    def _find(self, title: str) -> str:
-        views = self._client.get_state().views
-        for view in views:
-            if view.name.startswith(title):
-                return str(view.view_id)
-        names = ", ".join(sorted({v.name for v in views}))
-        raise InputError(f"view {title!r}: there is none; try {', '.join(TABS)}, {names}")
+class _Layout:
+    """A blueprint as the viewer tells it: {path: {archetype: fields}}."""
+
+    def __init__(self, tree: dict[str, Any]) -> None:
+        self._tree = tree
+        self._nodes = {path.strip("/"): fields for path, fields in tree.items()}
+        self._tabs = next(
+            path for path in self._nodes if tuple(map(self._title, self._inside(path))) == TABS
+        )
+
+    def find(self, name: str) -> tuple[int, str | None]:
+        """The tab called `name`; or the first view whose title starts so, and the tab it is in."""
+        if name in TABS:
+            return TABS.index(name), None
+        titles = []
+        for tab, path in enumerate(self._inside(self._tabs)):
+            for view in self._views(path):
+                titles.append(self._title(view))
+                if titles[-1].startswith(name):
+                    return tab, view.removeprefix("view/")
+        known = ", ".join([*TABS, *dict.fromkeys(titles)])
+        raise InputError(f"view {name!r}: there is none; try one of {known}")
+
+    def with_tab(self, tab: int) -> dict[str, Any]:
+        """The tree with another tab in front."""
+        fields = self._nodes[self._tabs]["ContainerBlueprint"]
+        fields["active_tab"] = self._inside(self._tabs)[tab]
+        return self._tree
+
+    def _views(self, path: str) -> list[str]:
+        if path.startswith("view/"):
+            return [path]
+        return [view for child in self._inside(path) for view in self._views(child)]
+
+    def _inside(self, path: str) -> list[str]:
+        container = self._nodes[path].get("ContainerBlueprint", {})
+        return [child.strip("/") for child in container.get("contents", ())]
+
+    def _title(self, path: str) -> str:
+        fields = self._nodes[path]
+        kind = "ViewBlueprint" if path.startswith("view/") else "ContainerBlueprint"
+        return str(fields.get(kind, {}).get("display_name"))
 
 
 def _connect(process: subprocess.Popen[bytes], port: int) -> Any:

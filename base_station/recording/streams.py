@@ -17,6 +17,7 @@ log = logging.getLogger(__name__)
 
 def to_file(path: Path, run_id: str, blueprint: Any = None) -> Any:
     """A stream into a file. A SIGKILL costs what came less than 1 s before."""
+    path.touch()  # before a stream exists that would be left without a sink
     stream = _stream(run_id, FILE_PERIOD_S)
     stream.set_sinks(rr.FileSink(str(path)), default_blueprint=blueprint)
     return stream

@@ -60,8 +60,7 @@ class TruthRecorder:
 
     def close(self) -> None:
         """Everything is in the file afterwards. May be called twice."""
-        channels, self._channels = self._channels, []
-        for channel in channels:
+        for channel in self._channels:
             channel.close()
 
     def _tell(self, call: Callable[["TruthWriter"], None]) -> None:

@@ -37,6 +37,9 @@ class TwinRows:
             self._batch.add(f"/twins/{gone}/report", col.SPOTS, ())
             self._trails.forget(gone)
         self.shown = names
+        if new := tuple(name for name in names if name not in self._order):
+            self._order += new
+            scene.style_belief(self._stream, self._order)
         for twin in twins:
             self._ghosts(twin)
         if twins:

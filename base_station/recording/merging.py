@@ -1,4 +1,4 @@
-"""Parts of a recording to one file, and the viewer's command line."""
+"""Parts of a recording to one file."""
 
 import logging
 import shutil
@@ -7,7 +7,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-MERGE_TIMEOUT_S = 120.0
+TOOL = [sys.executable, "-m", "rerun"]
+TIMEOUT_S = 120.0
 
 log = logging.getLogger(__name__)
 
@@ -31,9 +32,9 @@ def merge(parts: Sequence[Path], out: Path) -> None:
 
 
 def _rrd(*arguments: str) -> bool:
-    command = [sys.executable, "-m", "rerun", "rrd", *arguments]
+    command = [*TOOL, "rrd", *arguments]
     try:
-        done = subprocess.run(command, capture_output=True, timeout=MERGE_TIMEOUT_S, check=False)
+        done = subprocess.run(command, capture_output=True, timeout=TIMEOUT_S, check=False)
     except (OSError, subprocess.TimeoutExpired):
         return False
     if done.returncode:
