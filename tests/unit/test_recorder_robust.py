@@ -19,7 +19,7 @@ import rerun as rr
 from recorder_reading import rows, temporal
 
 from base_station.recorder import Recorder
-from base_station.recording.merging import merge
+from base_station.recording.merge import merge
 from base_station.recording.outlets import Queued
 from base_station.records import Snapshot
 

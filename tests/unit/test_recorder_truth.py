@@ -11,9 +11,9 @@ import rerun as rr
 from recorder_reading import entities, rows, temporal
 from rerun.chunk import RrdReader
 
+import base_station.recording.merge as merging
 from base_station.recorder import Recorder
-from base_station.recording import merging
-from base_station.recording.merging import merge
+from base_station.recording.merge import merge
 from base_station.recording.truth import TruthRecorder
 from base_station.records import Snapshot
 

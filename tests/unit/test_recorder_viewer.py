@@ -8,7 +8,7 @@ import recorder_fake_run as fake
 
 from base_station.recorder import Recorder
 from base_station.recording.blueprint import TABS
-from base_station.recording.merging import merge
+from base_station.recording.merge import merge
 from base_station.recording.screenshot import SIZE, Viewer, headless, screenshot
 from base_station.recording.truth import TruthRecorder
 from hil.errors import InputError
