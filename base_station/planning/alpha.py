@@ -13,6 +13,8 @@ from base_station.planning.starts import scattered
 from base_station.planning.tasks import Step
 from base_station.twin import (
     EAST,
+    HELD_EAST,
+    HELD_NORTH,
     NORTH,
     V_EAST,
     V_NORTH,
@@ -147,11 +149,13 @@ class AlphaTask:
         states = np.repeat(problem.start[None], n, axis=0)
         noise = START_SIGMA_M * self._rng.standard_normal((n, 1, problem.model.size, 2))
         states[..., NORTH : EAST + 1] += noise
+        states[..., HELD_NORTH : HELD_EAST + 1] += noise
         near = self._rng.random(n) < NEAR_START_SHARE * max(0.0, 1.0 - 2.0 * self.progress)
         others = [v for v in problem.commands.commanded if v != problem.suspect]
         centre = states[near, 0, problem.suspect, NORTH : EAST + 1]
         places = scattered(problem.model, self._rng, centre, others, problem.suspect)
         for v, place in zip(others, places.swapaxes(0, 1), strict=True):
             states[near, :, v, NORTH : EAST + 1] = place[:, None]
+            states[near, :, v, HELD_NORTH : HELD_EAST + 1] = place[:, None]
         self._states[which] = states
         self._elapsed[which] = 0

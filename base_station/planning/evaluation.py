@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from base_station.twin import (
     EAST,
+    HELD_EAST,
+    HELD_NORTH,
     NORTH,
     FaultArrays,
     FleetModel,
@@ -108,6 +110,7 @@ def plan_errors(
     states = np.repeat(start[None], draws, axis=0)
     noise = START_SIGMA_M * rng.standard_normal((draws, 1, model.size, 2))
     states[..., NORTH : EAST + 1] += noise
+    states[..., HELD_NORTH : HELD_EAST + 1] += noise  # else it would be evidence by itself
     tiled = Parameters(*(np.tile(x, (count, *[1] * (x.ndim - 1))) for x in parameters))
     prediction = predict(
         model,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from base_station.twin.compiled import compiled
+from base_station.twin.compiled import cached, compiled, sources
 from base_station.twin.contact import correct_positions, find_contacts, solve_contacts
 from base_station.twin.lump import (
     DAMP,
@@ -47,7 +47,7 @@ YAW_LIMIT = 0.5
 
 
 @compiled
-def advance_rows(
+def advance_all(
     vehicles: Any,
     parameters: Any,
     faults: Any,
@@ -199,3 +199,26 @@ def wrapped(angle_rad: float) -> float:
     if -math.pi <= angle_rad < math.pi:
         return angle_rad
     return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def _entry(version: int) -> Any:
+    def advance_rows(
+        vehicles: Any,
+        parameters: Any,
+        faults: Any,
+        states: Any,
+        setpoints: Any,
+        driven: Any,
+        steps: int,
+        impulses: Any,
+        walls: Any,
+    ) -> None:
+        if version != 0:  # read, so that the cache knows it
+            advance_all(
+                vehicles, parameters, faults, states, setpoints, driven, steps, impulses, walls
+            )
+
+    return cached(advance_rows)
+
+
+advance_rows = _entry(sources())

@@ -34,11 +34,10 @@ def lump(vehicles: Any, parameters: Any, faults: Any, p: int, h: int, k: Any) ->
         k[v, GIVE:LOSS] = 0.0
         for m in range(vehicles.arm_m.shape[1]):
             lump_motor(vehicles, parameters, faults, p, h, v, m, k)
-        for i in range(3):  # the trapezoidal rule: steps of 0.02 s then agree with finer ones
-            damped = (mass if i < 2 else inertia) + 0.5 * dt * k[v, DAMP + 4 * i]
+        for i in range(3):
             for j in range(3):
-                k[v, GIVE + 3 * i + j] /= damped
-                k[v, DAMP + 3 * i + j] /= damped
+                k[v, GIVE + 3 * i + j] /= mass if i < 2 else inertia
+                k[v, DAMP + 3 * i + j] /= mass if i < 2 else inertia
         k[v, LOSS] = parameters.rolling_force_n[p, v] / mass * dt
         k[v, YAW_LOSS] = parameters.yaw_resistance_nm[p, v] / inertia * dt
         k[v, INVERSE_MASS] = 1.0 / mass
