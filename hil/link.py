@@ -2,12 +2,13 @@
 
 import socket
 from collections import deque
+from contextlib import suppress
 from typing import Protocol, Self
 
 Address = tuple[str, int]
 
-# Where processes started by hand meet: ArduPilot's simulator port, QGroundControl's MAVLink port, and
-# one of our own. Vehicle i of the fleet uses base + 10 i.
+# Where processes started by hand meet: the ports of ArduPilot's simulator, of QGroundControl, and
+# of our own. Vehicle i of the fleet uses base + 10 i.
 PHYSICS_PORT_BASE, MAVLINK_PORT_BASE, INJECTOR_PORT_BASE = 9002, 14550, 15550
 
 
@@ -72,10 +73,9 @@ class UdpLink:
     def send(self, datagram: bytes) -> None:
         if self._peer is None:
             return
-        try:
+        # UDP: a full buffer or an absent peer loses the datagram, as on the air
+        with suppress(BlockingIOError, ConnectionRefusedError):
             self._socket.sendto(datagram, self._peer)
-        except (BlockingIOError, ConnectionRefusedError):
-            pass  # UDP: a full buffer or an absent peer loses the datagram, as on the air
 
     def receive(self) -> list[bytes]:
         datagrams: list[bytes] = []
