@@ -160,12 +160,17 @@ def _curves(kind: str) -> Any:
 
 
 def _bars(kind: str) -> Any:
-    return rrb.BarChartView(
-        origin="/",
-        contents=[f"/curves/{kind}/**"],
-        name=f"Learning {kind}: accepted, reward over steps",
-        plot_legend=rrb.PlotLegend(visible=False),
+    """Accepted and rejected attempts apart: bars hide each other."""
+    views = (
+        rrb.BarChartView(
+            origin="/",
+            contents=[f"/curves/{outcome}/{kind}/**"],
+            name=f"{outcome.title()} {kind}: reward over steps",
+            plot_legend=rrb.PlotLegend(visible=False),
+        )
+        for outcome in ("accepted", "rejected")
     )
+    return rrb.Tabs(*views)
 
 
 def _phases() -> Any:

@@ -43,10 +43,9 @@ class LearningRows:
         index = rr.TimeColumn(col.TRAINING_STEPS, sequence=steps.astype(np.int64))
         values = rr.Scalars.columns(scalars=rewards)
         self._stream.send_columns(f"/learning/{place}", indexes=[index], columns=values)
-        if training.accepted:  # bars of several attempts would hide each other
-            widths = np.diff(steps, prepend=0.0)
-            bars = rr.BarChart(rewards, abscissa=steps - widths / 2, widths=widths, color=color)
-            self._stream.log(f"/curves/{place}", bars)
+        widths = np.diff(steps, prepend=0.0)
+        bars = rr.BarChart(rewards, abscissa=steps - widths / 2, widths=widths, color=color)
+        self._stream.log(f"/curves/{outcome}/{place}", bars)
 
     def plan(self, ready: PlanReady, hypotheses: Sequence[str]) -> None:
         """The trainings behind a plan; `hypotheses` names the twins that predict, in order."""

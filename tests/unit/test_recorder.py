@@ -234,8 +234,10 @@ def test_curves_say_what_became_of_them(recording: Path) -> None:
     for attempt, outcome in ((0, "rejected"), (1, "accepted")):
         names = rows(recording, f"/learning/alpha/1/attempt_{attempt}", "SeriesLines:names")
         assert names[-1][1] == [f"attempt {attempt + 1}: ppo-mlp, {outcome}"]
-    assert "/curves/alpha/1/attempt_1" in entities(recording)
-    assert "/curves/alpha/1/attempt_0" not in entities(recording)
+        [(_, bars)] = temporal(
+            recording, f"/curves/{outcome}/alpha/1/attempt_{attempt}", "BarChart:values"
+        )
+        assert bars
 
 
 def test_plan_alpha_is_drawn_per_hypothesis_until_the_mission(recording: Path) -> None:
