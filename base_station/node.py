@@ -76,13 +76,13 @@ class StationNode:
             datagram = encode(command, self._encoders[index])
             self._links[index].send(datagram)
             self._log(index, epoch_us, datagram)
-        if out.request is not None:
-            self._planner.submit(out.request)
         for listener in self._listeners:
             for event in out.events:
                 listener.event(event)
             for snapshot in out.snapshots:
                 listener.snapshot(snapshot)
+        if out.request is not None:
+            self._planner.submit(out.request)
         self._phases.at(self.station.phase.name, wall_s, self.station.time_s)
         self._finish()
 
