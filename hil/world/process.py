@@ -125,9 +125,7 @@ class _Server:
                 self.links[to].send(reply)
 
     def _wait_s(self, now_s: float) -> float:
-        step_s = 1.0 / self.simulation.world.physics_hz
-        on_leash = self.simulation.time_s + step_s > self._until_s() + 1e-6
-        if on_leash or not self.simulation.may_step():
+        if not self.simulation.may_step(self._until_s()):
             return _POLL_S
         return self.pace.wait_s(self.simulation.time_s, now_s)
 

@@ -1,5 +1,6 @@
 """Space and lockstep together: datagrams in, datagrams and truth out (pure; time is passed in)."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -46,18 +47,18 @@ class Simulation:
         ]
         return tuple((sysid, reply) for reply in again if reply is not None)
 
-    def may_step(self) -> bool:
-        """Every vehicle has joined and nobody owes a frame."""
-        return not self.lockstep.absent() and self.lockstep.may_step()
+    def may_step(self, until_s: float) -> bool:
+        """Every vehicle has joined, nobody owes a frame, and a step more is not too far."""
+        joined = not self.lockstep.absent() and self.lockstep.may_step()
+        return joined and self.world.steps < self._last_step(until_s)
 
     def advance(self, until_s: float, now_s: float) -> Advance:
-        """Step to the next answer, never beyond `until_s`. Call it when `may_step()`."""
+        """Step to the next answer, never beyond `until_s`. Call it when `may_step(until_s)`."""
         truth = self._sample()
         contacts: list[ContactEpisode] = []
-        target = self.lockstep.next_answer()
+        target = min(self.lockstep.next_answer(), self._last_step(until_s))
         outputs = self.lockstep.outputs()
-        limit = until_s * self.world.physics_hz + 1e-6
-        while self.world.steps < target and self.world.steps + 1 <= limit:
+        while self.world.steps < target:
             self.world.step(outputs)
             contacts += self._contact_log.add(self.time_s, self.world.contacts())
             truth += self._sample()
@@ -66,6 +67,11 @@ class Simulation:
     def close(self) -> Advance:
         """The last truth and the contacts still open."""
         return Advance((), (self.world.truth(),), self._contact_log.close())
+
+    def _last_step(self, until_s: float) -> float:
+        """The last whole step that ends by `until_s`; decimal times may be a hair too small."""
+        steps = until_s * self.world.physics_hz + 1e-6
+        return math.floor(steps) if math.isfinite(steps) else steps
 
     def _answer(self, now_s: float) -> tuple[Reply, ...]:
         replies = []

@@ -1,5 +1,8 @@
 """Lockstep: frames in, answers out, repeats dropped, the silent named."""
 
+from hypothesis import given
+from hypothesis import strategies as st
+
 from hil.physics_link import ServoFrame, decode_state, encode_frame, pad_channels
 from hil.scenario import Scenario
 from hil.world.lockstep import RESEND_AFTER_S, SILENT_AFTER_S, Lockstep
@@ -144,6 +147,24 @@ def test_the_leash_may_end_inside_a_frame() -> None:
     assert simulation.time_s == 0.01
     assert len(simulation.advance(1.0, 0.0).replies) == 2
     assert simulation.time_s == 0.02
+
+
+@given(st.floats(0.0, 0.1, allow_nan=False))
+def test_who_may_step_does_and_who_may_not_does_not(until_s: float) -> None:
+    """A world that believes it may step and then does not would spin for ever."""
+    simulation = Simulation(two_rovers(), 0)
+    count = 0
+    while simulation.lockstep.waiting_for() or count == 0:
+        for sysid in (1, 2):
+            simulation.receive(sysid, [encode_frame(frame(count))], 0.0)
+        count += 1
+        while simulation.may_step(until_s):
+            before = simulation.world.steps
+            simulation.advance(until_s, 0.0)
+            assert simulation.world.steps > before
+        if not simulation.lockstep.waiting_for():
+            break
+    assert until_s - 1 / 200 <= simulation.time_s <= until_s + 1e-6
 
 
 def test_truth_comes_at_ten_hertz_from_zero_on() -> None:
