@@ -4,18 +4,27 @@
 Units are in the field names; positions are local NED metres from `origin`.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
 
 from hil import airframe as airframes
 from hil.airframe import Airframe
 from hil.errors import InputError
-from hil.faults import SUPPORTED, Fault, Type, Unit
+from hil.faults import Fault, Type, Unit, refusal
 from hil.frames import Origin
 
 MAX_FILE_BYTES = 1_000_000
@@ -27,6 +36,27 @@ NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Probability = Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)]
 SysId = Annotated[int, Field(ge=1, le=249)]
 Port = Annotated[int, Field(ge=1024, le=65000)]
+
+STATION_AIRFRAMES = ("omni_plus",)  # those that the station's twin can be
+
+
+def _known_airframe(name: str) -> str:
+    if name not in airframes.AIRFRAMES:
+        raise ValueError(f"no such airframe; there are {', '.join(airframes.AIRFRAMES)}")
+    return name
+
+
+AirframeName = Annotated[
+    str, AfterValidator(_known_airframe), Field(json_schema_extra={"enum": [*airframes.AIRFRAMES]})
+]
+
+
+def _listed(value: Any) -> Any:
+    """A single number where a list of them is meant."""
+    return (value,) if isinstance(value, int | float) else value
+
+
+Numbers = Annotated[tuple[Finite, ...], BeforeValidator(_listed)]
 
 
 class Model(BaseModel):
@@ -82,7 +112,7 @@ class Clock(Model):
     @model_validator(mode="after")
     def _rates_divide(self) -> Self:
         chain = ("physics_hz", "autopilot_hz", "telemetry_hz", "control_hz")
-        for fast, slow in zip(chain, chain[1:], strict=False):
+        for fast, slow in itertools.pairwise(chain):
             if getattr(self, fast) % getattr(self, slow):
                 raise ValueError(
                     f"{slow} = {getattr(self, slow)} must divide {fast} = {getattr(self, fast)}"
@@ -93,7 +123,7 @@ class Clock(Model):
 class Vehicle(Model):
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
     sysid: SysId
-    airframe: Literal["omni_plus"] = "omni_plus"
+    airframe: AirframeName = "omni_plus"
     start: Point
     start_yaw_deg: Finite = 0.0
     goal: Point
@@ -113,6 +143,8 @@ class Sensors(Model):
     gps_velocity_sigma_mps: Positive = 0.05
     gyro_sigma_radps: Positive = 0.005
     compass_sigma_rad: Positive = 0.01
+    accel_sigma_mps2: Positive = 0.05
+    level_sigma_rad: Positive = 0.002
 
 
 class Plant(Model):
@@ -130,7 +162,9 @@ class Onset(Model):
     at_s: NonNegative | None = None
     when: Annotated[
         str | None,
-        Field(pattern=r"^[a-z][a-z0-9_]*\.(goal_distance_m|north_m|east_m|speed_mps) *[<>] *-?[0-9.]+$"),
+        Field(
+            pattern=r"^[a-z][a-z0-9_]*\.(goal_distance_m|north_m|east_m|speed_mps) *[<>] *-?[0-9.]+$"
+        ),
     ] = None
 
     @model_validator(mode="after")
@@ -141,22 +175,29 @@ class Onset(Model):
 
 
 class FaultModel(Model):
+    """`size` is a number or a vector in the units of docs/faults.md; most types need one."""
+
     vehicle: SysId
-    unit: Literal["motor", "gps"]
-    type: Literal["off", "stuck"]
+    unit: Literal["motor", "esc", "gps", "gyro", "accel"]
+    type: Literal[
+        "off", "locked", "partial", "reversed", "stuck", "intermittent", "repeat", "offset",
+        "drift", "glitch", "noise", "delay", "bias", "wrong",
+    ]  # fmt: skip
     instances: tuple[Annotated[int, Field(ge=1, le=16)], ...] = ()
     axes: tuple[Literal["north", "east", "down"], ...] = ()
+    size: Numbers = ()
     onset: Onset = Onset(at_s=0.0)
 
     @model_validator(mode="after")
     def _can_be_injected(self) -> Self:
-        fault = self.fault()
-        if (fault.unit, fault.type) not in SUPPORTED:
-            raise ValueError(f"no injector for {self.unit} {self.type}; try motor off or gps stuck")
+        why_not = refusal(self.fault())
+        if why_not:
+            raise ValueError(why_not)
         return self
 
     def fault(self) -> Fault:
-        return Fault(Unit[self.unit.upper()], Type[self.type.upper()], self.instances, self.axes)
+        unit, kind = Unit[self.unit.upper()], Type(self.type)
+        return Fault(unit, kind, self.instances, self.axes, self.size)
 
 
 class Priors(Model):
@@ -304,9 +345,11 @@ class Scenario(Model):
         sysids = [v.sysid for v in self.fleet]
         if fault.vehicle not in sysids:
             raise ValueError(f"{where}.vehicle = {fault.vehicle} is not in the fleet {sysids}")
-        motors = len(self.vehicle(fault.vehicle).frame.motors)
+        frame = self.vehicle(fault.vehicle).frame
+        if fault.type == "reversed" and not all(m.reversible for m in frame.motors):
+            raise ValueError(f"{where}: the motors of {frame.name} can't be reversed")
         for instance in fault.instances:
-            limit = motors if fault.unit == "motor" else 1
+            limit = len(frame.motors) if fault.unit in ("motor", "esc") else 1
             if instance > limit:
                 raise ValueError(f"{where}.instances has {instance}; the highest is {limit}")
         if fault.onset.when and fault.onset.when.split(".")[0] not in [v.name for v in self.fleet]:
@@ -327,7 +370,16 @@ def _pairs(fleet: Sequence[Vehicle]) -> list[tuple[Vehicle, Vehicle]]:
 
 
 def station_view(scenario: Scenario, mavlink_port_base: int, station_seed: int) -> StationView:
-    """The part of a scenario that a ground station would have been told."""
+    """The part of a scenario that a ground station would have been told.
+
+    Raises InputError for an airframe that the station has no twin of.
+    """
+    for v in scenario.fleet:
+        if v.airframe not in STATION_AIRFRAMES:
+            raise InputError(
+                f"{scenario.name}: {v.name} is a {v.airframe}, and the base station has no twin of "
+                f"that yet; it knows {', '.join(STATION_AIRFRAMES)}"
+            )
     fleet = tuple(
         FleetMember(
             name=v.name,
@@ -404,7 +456,9 @@ class _StrictLoader(yaml.SafeLoader):
         keys = [key.value for key, _ in node.value]
         for key in keys:
             if keys.count(key) > 1:
-                raise yaml.YAMLError(f"key {key!r} is given twice (line {node.start_mark.line + 1})")
+                raise yaml.YAMLError(
+                    f"key {key!r} is given twice (line {node.start_mark.line + 1})"
+                )
         return super().construct_mapping(node, deep)
 
 
@@ -416,7 +470,7 @@ def _read_map(path: Path) -> dict[str, Any]:
     if len(raw) > MAX_FILE_BYTES:
         raise InputError(f"{path}: {len(raw)} bytes; the limit is {MAX_FILE_BYTES}")
     try:
-        tree = yaml.load(raw.decode("utf-8"), _StrictLoader)  # noqa: S506 - a SafeLoader
+        tree = yaml.load(raw.decode("utf-8"), _StrictLoader)  # a SafeLoader
     except UnicodeDecodeError:
         raise InputError(f"{path}: not UTF-8 text; a scenario is a YAML file") from None
     except (yaml.YAMLError, RecursionError) as error:
@@ -439,11 +493,11 @@ def _apply_override(tree: dict[str, Any], override: str) -> None:
     node: Any = tree
     for key in parents:
         node = _child(node, key, override)
-    if isinstance(node, list):
+    if isinstance(node, dict):
+        node[last] = value
+    else:
         _child(node, last, override)
         node[int(last)] = value
-    else:
-        node[last] = value
 
 
 def _child(node: Any, key: str, override: str) -> Any:

@@ -1,9 +1,11 @@
 """The estimator: GPS, gyro and compass to position, velocity and heading.
 
 One constant-velocity Kalman filter per NED axis, with acceleration as process noise. All axes see
-the same noise at the same times, so they share one covariance. No accelerometer yet.
+the same noise at the same times, so they share one covariance. The accelerometer is not used;
+without fixes the last velocity is believed.
 """
 
+import math
 from dataclasses import dataclass
 
 from hil.frames import wrap_pi
@@ -21,6 +23,8 @@ class Estimate:
     velocity_mps: Vector
     yaw_rad: float
     gyro_radps: Vector
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
 
 
 class Estimator:
@@ -31,6 +35,8 @@ class Estimator:
         self._velocity_variance = noise.gps_velocity_sigma_mps**2
         self._fixes_needed = noise.gps_hz  # one second of them
         self._fixes = 0
+        self.fix_age_s = math.inf  # since the last fix
+        self._level = (0.0, 0.0)
         self._axes: list[tuple[float, float]] = [(0.0, 0.0)] * 3  # position, velocity
         self._covariance = (1e6, 0.0, 1e2)  # pp, pv, vv
         self._gyro_variance = noise.gyro_sigma_radps**2
@@ -46,11 +52,12 @@ class Estimator:
 
     def estimate(self) -> Estimate:
         (n, vn), (e, ve), (d, vd) = self._axes
-        return Estimate((n, e, d), (vn, ve, vd), self._yaw or 0.0, self._gyro)
+        return Estimate((n, e, d), (vn, ve, vd), self._yaw or 0.0, self._gyro, *self._level)
 
     def inertial(self, sample: Inertial, dt_s: float) -> None:
         """Advance by dt and turn with the gyro; the compass corrects the heading."""
-        self._gyro = sample.gyro_radps
+        self._gyro, self._level = sample.gyro_radps, sample.level_rad
+        self.fix_age_s += dt_s
         if self._yaw is None:
             self._yaw = wrap_pi(sample.compass_rad)
         predicted = self._yaw + sample.gyro_radps[2] * dt_s
@@ -64,6 +71,7 @@ class Estimator:
         """Correct position and velocity; the first fix is taken as it is."""
         fixed = tuple(zip(fix.position_m, fix.velocity_mps, strict=True))
         self._fixes += 1
+        self.fix_age_s = 0.0
         if self._fixes == 1:
             self._axes = list(fixed)
             self._covariance = (self._position_variance, 0.0, self._velocity_variance)

@@ -1,28 +1,42 @@
-"""Sensors: what the physics state looks like through noise, and through a GPS fault.
+"""Sensors: what the physics state looks like through noise, and through faults.
 
-The draws never depend on faults, so the same seed gives the same noise with and without one.
+The draws never depend on faults, so the same seed gives the same noise with and without one: what
+a fault adds comes from streams of their own, which are drawn from whether or not it is in effect.
 """
 
 import math
+from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hil.airframe import GRAVITY_MPS2
+from hil.faults import REPEAT_BIT
 from hil.physics_link import PhysicsState
 from hil.scenario import Sensors as Noise
+from sim_vehicles.damage import GpsDamage, ImuDamage
 
 Vector = tuple[float, float, float]
 _GYRO_STREAM, _GPS_STREAM = 0x4759524F, 0x475053
+_ACCEL_STREAM, _IMU_EXTRA_STREAM, _GPS_EXTRA_STREAM = 0x4143434C, 0x494D5558, 0x47505358
 _BLOCK = 256
+_LONGEST_LAG_S = 10.0
+_WHOLE = GpsDamage()
+_SOUND = ImuDamage()
 
 
 @dataclass(frozen=True, slots=True)
 class Inertial:
-    """Gyro (body, rad/s) and compass heading (rad), each autopilot step."""
+    """Each autopilot step: gyro (body, rad/s), compass heading (rad), specific force, levels.
+
+    `level_rad` is roll and pitch, as a levelled attitude filter gives them.
+    """
 
     gyro_radps: Vector
     compass_rad: float
+    accel_mps2: Vector = (0.0, 0.0, -GRAVITY_MPS2)
+    level_rad: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,17 +56,36 @@ def noise_rows(seed: tuple[int, ...], width: int) -> Iterator[list[float]]:
 
 
 class InertialSensors:
-    """White noise on gyro and compass."""
+    """White noise on gyro, accelerometer, compass and levels."""
 
     def __init__(self, noise: Noise, seed: int, sysid: int) -> None:
         self._gyro_sigma, self._compass_sigma = noise.gyro_sigma_radps, noise.compass_sigma_rad
+        self._accel_sigma, self._level_sigma = noise.accel_sigma_mps2, noise.level_sigma_rad
         self._rows = noise_rows((seed, sysid, _GYRO_STREAM), 4)
+        self._accel_rows = noise_rows((seed, sysid, _ACCEL_STREAM), 5)
+        self._extra_rows = noise_rows((seed, sysid, _IMU_EXTRA_STREAM), 6)
 
-    def sample(self, state: PhysicsState) -> Inertial:
-        z = next(self._rows)
-        (p, q, r), sigma = state.gyro_radps, self._gyro_sigma
-        gyro = (p + sigma * z[0], q + sigma * z[1], r + sigma * z[2])
-        return Inertial(gyro, state.attitude_rad[2] + self._compass_sigma * z[3])
+    def sample(
+        self, state: PhysicsState, gyro: ImuDamage = _SOUND, accel: ImuDamage = _SOUND
+    ) -> Inertial:
+        z, a, extra = next(self._rows), next(self._accel_rows), next(self._extra_rows)
+        roll, pitch, yaw = state.attitude_rad
+        return Inertial(
+            _measured(state.gyro_radps, self._gyro_sigma, z, gyro, extra),
+            yaw + self._compass_sigma * z[3],
+            _measured(state.accel_body_mps2, self._accel_sigma, a, accel, extra[3:]),
+            (roll + self._level_sigma * a[3], pitch + self._level_sigma * a[4]),
+        )
+
+
+def _measured(
+    truth: Vector, sigma: float, z: list[float], damage: ImuDamage, extra: list[float]
+) -> Vector:
+    x, y, w = (t + sigma * n for t, n in zip(truth, z, strict=False))
+    if damage is _SOUND or damage == _SOUND:
+        return x, y, w
+    (bx, by, bw), k = damage.bias, damage.noise
+    return x + bx + k * extra[0], y + by + k * extra[1], w + bw + k * extra[2]
 
 
 class Gps:
@@ -67,22 +100,30 @@ class Gps:
         self._period_s = 1.0 / noise.gps_hz
         self._due_s = 0.0
         self._rows = noise_rows((seed, sysid, _GPS_STREAM), 9)
+        self._extra_rows = noise_rows((seed, sysid, _GPS_EXTRA_STREAM), 3)
         self._keep = math.exp(-self._period_s / noise.gps_wander_time_s)
         self._kick_m = noise.gps_wander_sigma_m * math.sqrt(1.0 - self._keep**2)
         self._wander_m = [noise.gps_wander_sigma_m * z for z in next(self._rows)[:3]]
         self._frozen: dict[int, tuple[float, float]] = {}  # axis: mean position and velocity
+        self._past: deque[PhysicsState] = deque()  # for a receiver that lags
+        self._last: GpsFix | None = None
 
-    def sample(self, state: PhysicsState, stuck_mask: int) -> GpsFix | None:
-        """The fix at this step if one is due; `stuck_mask` has bits N, E, D."""
-        means = [self._mean(state, axis, stuck_mask) for axis in range(3)] if stuck_mask else None
-        if not stuck_mask and self._frozen:
-            self._frozen.clear()
+    def sample(self, state: PhysicsState, damage: GpsDamage = _WHOLE) -> GpsFix | None:
+        """The fix at this step if one is due, and the receiver gives it."""
+        means = self._means(self._lagged(state, damage.lag_s), damage, state.time_s)
         if state.time_s + 1e-6 < self._due_s:
             return None
         self._due_s = (math.floor(state.time_s / self._period_s + 1e-6) + 1) * self._period_s
-        z = next(self._rows)
-        if means is None:
-            means = list(zip(state.position_m, state.velocity_mps, strict=True))
+        fix = self._noisy(state.time_s, means, damage.noise_m)
+        if damage.stuck_mask & REPEAT_BIT and self._last is not None:
+            fix = replace(self._last, time_s=state.time_s)
+        if damage.silent(state.time_s):
+            return None
+        self._last = fix
+        return fix
+
+    def _noisy(self, time_s: float, means: list[tuple[float, float]], extra_m: float) -> GpsFix:
+        z, extra = next(self._rows), next(self._extra_rows)
         sigma_m, sigma_mps = self._noise.gps_position_sigma_m, self._noise.gps_velocity_sigma_mps
         wander = self._wander_m
         for i in range(3):
@@ -93,12 +134,42 @@ class Gps:
             e + wander[1] + sigma_m * z[1],
             d + wander[2] + sigma_m * z[2],
         )
+        if extra_m > 0.0:
+            n, e, d = position
+            position = (n + extra_m * extra[0], e + extra_m * extra[1], d + extra_m * extra[2])
         velocity = (vn + sigma_mps * z[3], ve + sigma_mps * z[4], vd + sigma_mps * z[5])
-        return GpsFix(state.time_s, position, velocity)
+        return GpsFix(time_s, position, velocity)
 
-    def _mean(self, state: PhysicsState, axis: int, stuck_mask: int) -> tuple[float, float]:
-        now = (state.position_m[axis], state.velocity_mps[axis])
-        if stuck_mask >> axis & 1:
+    def _lagged(self, state: PhysicsState, lag_s: float) -> PhysicsState:
+        """The state that a receiver sees which is that much late."""
+        past = self._past
+        past.append(state)
+        while past[0].time_s < state.time_s - _LONGEST_LAG_S - 1e-6:
+            past.popleft()
+        if lag_s <= 0.0:
+            return state
+        old = [s for s in past if s.time_s <= state.time_s - lag_s + 1e-6]
+        return old[-1] if old else past[0]
+
+    def _means(
+        self, seen: PhysicsState, damage: GpsDamage, now_s: float
+    ) -> list[tuple[float, float]]:
+        """Position and velocity per NED axis, before noise."""
+        means = list(zip(seen.position_m, seen.velocity_mps, strict=True))
+        if damage is _WHOLE or damage == _WHOLE:
+            self._frozen.clear()
+            return means
+        return [self._mean(axis, *means[axis], damage, now_s) for axis in range(3)]
+
+    def _mean(
+        self, axis: int, m: float, mps: float, damage: GpsDamage, now_s: float
+    ) -> tuple[float, float]:
+        glitch_mps, drift_mps = damage.glitch_mps[axis], damage.drift_mps[axis]
+        m += damage.offset_m[axis]
+        m += glitch_mps * (now_s - damage.glitch_since_s)
+        m += drift_mps * (now_s - damage.drift_since_s)
+        now = (m, mps + glitch_mps)
+        if damage.stuck_mask >> axis & 1:
             return self._frozen.setdefault(axis, now)
         self._frozen.pop(axis, None)
         return now

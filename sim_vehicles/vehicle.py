@@ -24,6 +24,7 @@ from sim_vehicles.autopilot import (
 )
 from sim_vehicles.battery import BatteryState, drain
 from sim_vehicles.control import Drive, Memory, drive_at, velocity_towards
+from sim_vehicles.damage import MotorOutputs
 from sim_vehicles.estimator import Estimate, Estimator
 from sim_vehicles.parameters import rover_parameters
 from sim_vehicles.port import Port
@@ -39,6 +40,7 @@ from sim_vehicles.services.streams import Builder, StreamService
 from sim_vehicles.telemetry import Snapshot
 
 PortName = Literal["gcs", "injector"]
+FIX_LOST_AFTER_S = 1.0  # without a fix for so long, telemetry says that there is none
 _TELEMETRY: Mapping[MessageId, Callable[[Snapshot], Message | None]] = {
     MessageId.HEARTBEAT: telemetry.heartbeat,
     MessageId.SYS_STATUS: telemetry.sys_status,
@@ -88,6 +90,7 @@ class Vehicle:
         self._autopilot = Autopilot()
         self._battery = BatteryState()
         self._memory = Memory()
+        self._outputs = MotorOutputs(member.frame)
         self._now_s: float | None = None
         self._gcs_heard_s: float | None = None
         self._fix: GpsFix | None = None
@@ -111,7 +114,7 @@ class Vehicle:
             *(module.handlers() for module in (time, mission, ftp)),
         )
         sizes = injection_parameters()
-        self._failures = FailureService(sizes, len(self._drive.airframe.motors))
+        self._failures = FailureService(sizes, self._drive.airframe)
         beats = StreamService(builders, {MessageId.HEARTBEAT: 1.0})
         injector = merged(
             CommandService({**beats.executors(), **self._failures.executors()}).handlers(),
@@ -148,11 +151,14 @@ class Vehicle:
         return self._broken(self._pwm)
 
     def _sense(self, state: PhysicsState, dt_s: float) -> None:
-        self._estimator.inertial(self._inertial.sample(state), dt_s)
-        fix = self._gps.sample(state, self._failures.active.gps_stuck_mask)
+        damage = self._failures.active
+        self._estimator.inertial(self._inertial.sample(state, damage.gyro, damage.accel), dt_s)
+        fix = self._gps.sample(state, damage.gps)
         if fix is not None:
             self._fix = fix
             self._estimator.gps(fix)
+        elif self._estimator.fix_age_s > FIX_LOST_AFTER_S:
+            self._fix = None
         if self._home_m is None and self._estimator.ready:
             self._home_m = self._estimator.estimate().position_m
             self._tell((StatusText(Severity.INFO, "Position estimate ready"),))
@@ -194,11 +200,8 @@ class Vehicle:
         return target.velocity_mps or (0.0, 0.0)
 
     def _broken(self, pwm_us: tuple[int, ...]) -> tuple[int, ...]:
-        """The same PWM with broken motors off: after reporting, so that the fault is silent."""
-        off = self._failures.active.motors_off
-        if not off:
-            return pwm_us
-        return tuple(0 if i in off else pwm for i, pwm in enumerate(pwm_us, start=1))
+        """What the motors get: after reporting, so that a motor fault is silent."""
+        return self._outputs.broken(self._failures.active.motors, pwm_us, self._now_s or 0.0)
 
     def _apply(self, change: Change) -> Result:
         transition: Transition = change(self._autopilot, self._estimator.ready)

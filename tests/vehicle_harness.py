@@ -4,7 +4,18 @@ import math
 from typing import TypeVar
 
 from hil.airframe import motor_forces, pwm_to_output
-from hil.mavlink import COMPONENT_GCS, Decoder, Encoder, Message, Received, RoverMode
+from hil.faults import GATE, Injection
+from hil.mavlink import (
+    COMPONENT_GCS,
+    CommandAck,
+    Decoder,
+    Encoder,
+    Message,
+    ParamValue,
+    Received,
+    Result,
+    RoverMode,
+)
 from hil.physics_link import AT_REST_MPS2, PhysicsState
 from hil.scenario import Scenario
 from sim_vehicles.vehicle import PortName, Vehicle
@@ -43,7 +54,17 @@ class Harness:
         return self.received(port)
 
     def inject(self, *numbers: int) -> None:
+        self.tell(self.injector.param_set(self.sysid, GATE, 1.0), "injector")
         self.tell(self.injector.inject_failure(self.sysid, *numbers), "injector")
+
+    def inject_all(self, injection: Injection) -> None:
+        """The whole sequence; every order must be confirmed."""
+        for name, value in injection.parameters:
+            self.tell(self.injector.param_set(self.sysid, name, value), "injector")
+            assert [p.name for p in self.values(ParamValue, "injector")] == [name]
+        for numbers in injection.commands:
+            self.tell(self.injector.inject_failure(self.sysid, *numbers), "injector")
+            assert [a.result for a in self.values(CommandAck, "injector")] == [Result.ACCEPTED]
 
     def run(
         self, seconds: float, velocity_mps: tuple[float, float] | None = None, beats: bool = True

@@ -1,32 +1,38 @@
 """Failure injection: MAV_CMD_INJECT_FAILURE and the SIM_ parameters that carry sizes.
 
-This service is on the injector's port alone; on the station's port it does not exist. An ACK of
-ACCEPTED means that the fault is in effect from the next step on.
+This service is on the injector's port alone; on the station's port it does not exist. It is shut
+until SYS_FAILURE_EN is 1. An ACK of ACCEPTED means that the fault is in effect from the next step
+on; what can't be done is UNSUPPORTED, and what can't be done to this vehicle is DENIED.
 """
 
 import math
 from collections.abc import Mapping
 
-from hil.faults import SUPPORTED, ActiveFaults, Type, Unit
-from hil.mavlink import Command, ParamType, Result, Severity, StatusText
+from hil.airframe import Airframe
+from hil.faults import ENGINE_MUL, GATE, KINDS, FailureType, Unit, size_parameters
+from hil.mavlink import Command, Message, ParamType, Result, Severity, StatusText
+from sim_vehicles.damage import Damage, inject
 from sim_vehicles.parameters import Parameter, Parameters
 from sim_vehicles.services.commands import DENIED, UNSUPPORTED, Executor, Order, Outcome
 
-STUCK_AXES = "SIM_GPS1_STUCK"  # bits north, east, down; 0 means all of them
-_POSSIBLE = SUPPORTED | {(unit, Type.OK) for unit, _ in SUPPORTED}
+_POSSIBLE = frozenset((unit, kind.failure_type) for (unit, _), kind in KINDS.items()) | {
+    (unit, FailureType.OK) for unit in Unit
+}
 
 
 def injection_parameters() -> Parameters:
-    """The sizes of faults, as they stand before any is injected."""
-    return Parameters((Parameter(STUCK_AXES, 0, 0, 7, ParamType.INT8),))
+    """The gate, and the sizes of faults as they stand before any is injected."""
+    gate = Parameter(GATE, 0, 0, 1, ParamType.INT8)
+    sizes = (Parameter(s.parameter, s.default, s.low, s.high) for _, s in size_parameters())
+    return Parameters((gate, *sizes))
 
 
 class FailureService:
     """Holds the faults in effect."""
 
-    def __init__(self, sizes: Parameters, motor_count: int) -> None:
-        self._sizes, self._motor_count = sizes, motor_count
-        self.active = ActiveFaults()
+    def __init__(self, sizes: Parameters, airframe: Airframe) -> None:
+        self._sizes, self._airframe = sizes, airframe
+        self.active = Damage.none(airframe)
 
     def executors(self) -> Mapping[int, Executor]:
         return {Command.INJECT_FAILURE: self._inject}
@@ -35,17 +41,35 @@ class FailureService:
         unit, kind, instances = order.integer(1), order.integer(2), _instances(order)
         if (unit, kind) not in _POSSIBLE or unit is None or kind is None:
             return UNSUPPORTED
-        if instances is None:
+        if not self._sizes[GATE]:
+            return Outcome(Result.DENIED, (_text(f"{GATE} is 0"),))
+        if instances is None or self._is_impossible(unit, kind):
             return DENIED
-        stuck_mask = int(self._sizes[STUCK_AXES])
-        faults: ActiveFaults | None = self.active
+        damage: Damage | None = self.active
+        sizes = {name: self._sizes[name] for name in self._sizes.names}
         for instance in instances:
-            faults = faults and faults.apply(unit, kind, instance, self._motor_count, stuck_mask)
-        if faults is None:
+            damage = damage and inject(damage, unit, kind, instance, sizes, order.now_s)
+        if damage is None:
             return DENIED
-        self.active = faults
-        text = f"{Unit(unit).name} {Type(kind).name} {list(instances)}"
-        return Outcome(Result.ACCEPTED, (StatusText(Severity.NOTICE, f"Failure: {text}"),))
+        self.active = damage
+        if kind == FailureType.OK:
+            self._forget_sizes(unit)
+        name = f"{Unit(unit).name} {FailureType(kind).name} {list(instances)}"
+        return Outcome(Result.ACCEPTED, (_text(name),))
+
+    def _is_impossible(self, unit: int, kind: int) -> bool:
+        """A propeller that lifts can't be driven backwards: its controller has no reverse."""
+        reverses = unit == Unit.MOTOR and kind == FailureType.WRONG and self._sizes[ENGINE_MUL] < 0
+        return reverses and not all(m.reversible for m in self._airframe.motors)
+
+    def _forget_sizes(self, unit: int) -> None:
+        for owner, size in size_parameters():
+            if owner == unit:
+                self._sizes.set(size.parameter, size.default)
+
+
+def _text(words: str) -> Message:
+    return StatusText(Severity.NOTICE, f"Failure: {words}")
 
 
 def _instances(order: Order) -> tuple[int, ...] | None:

@@ -8,6 +8,7 @@ from bench_builders import rescue
 from hil.bench.injector import ANSWER_WITHIN_S, RESEND_S, Breaker
 from hil.bench.onsets import Onsets, parse_condition
 from hil.errors import InputError, ProcessDiedError
+from hil.faults import ENGINE_LOCK, GATE
 from hil.mavlink import (
     COMPONENT_AUTOPILOT,
     Command,
@@ -58,7 +59,9 @@ def test_nothing_asked_nothing_sent(breaker: Breaker) -> None:
 
 def test_each_motor_is_a_command_of_its_own(breaker: Breaker, struck: list[FaultModel]) -> None:
     breaker.strike([OFF])
-    (first,) = sent(breaker.step(0.0, 2, []))
+    breaker.step(0.0, 2, [])
+    breaker.step(0.0, 2, answer(ParamValue(GATE, 1.0, 0, 2)))
+    (first,) = sent(breaker.step(0.0, 2, answer(ParamValue(ENGINE_LOCK, 0.0, 1, 2))))
     assert isinstance(first, CommandLong)
     assert (first.command, first.params[:3]) == (420, (101.0, 1.0, 3.0))
     (second,) = sent(breaker.step(0.1, 2, answer(ack())))
@@ -71,7 +74,9 @@ def test_each_motor_is_a_command_of_its_own(breaker: Breaker, struck: list[Fault
 
 def test_parameters_go_before_commands(breaker: Breaker, struck: list[FaultModel]) -> None:
     breaker.strike([STUCK])
-    (first,) = sent(breaker.step(0.0, 2, []))
+    (gate,) = sent(breaker.step(0.0, 2, []))
+    assert (gate.name, gate.value) == (GATE, 1.0)
+    (first,) = sent(breaker.step(0.0, 2, answer(ParamValue(GATE, 1.0, 0, 2))))
     assert isinstance(first, ParamSet)
     assert (first.name, first.value) == ("SIM_GPS1_STUCK", 2.0)
     (second,) = sent(breaker.step(0.1, 2, answer(ParamValue("SIM_GPS1_STUCK", 2.0, 0, 1))))
@@ -119,6 +124,8 @@ def test_a_refusal_is_named(
 ) -> None:
     breaker.strike([fault])
     breaker.step(0.0, 2, [])
+    for name, value in ((GATE, 1.0), (ENGINE_LOCK, 0.0))[: 2 if fault is OFF else 1]:
+        breaker.step(0.0, 2, answer(ParamValue(name, value, 0, 2)))
     with pytest.raises(InputError, match="rover_2 refuses") as error:
         breaker.step(0.1, 2, answer(refusal))
     assert words in str(error.value)

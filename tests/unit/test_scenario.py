@@ -49,7 +49,7 @@ BAD_VALUES: dict[str, tuple[Edit, str]] = {
     "empty arena": (lambda t: t["arena"].update(north_max_m=-9.0), "arena is empty"),
     "fault of a stranger": (lambda t: t["faults"][0].update(vehicle=9), "not in the fleet"),
     "fault of motor 5": (lambda t: t["faults"][0].update(instances=[5]), "the highest is 4"),
-    "fault nobody can make": (lambda t: t["faults"][0].update(type="stuck"), "no injector"),
+    "fault nobody can make": (lambda t: t["faults"][0].update(type="bias"), "no injector"),
     "two onsets": (
         lambda t: t["faults"][0].update(onset={"at_s": 1.0, "when": "rover_2.north_m > 1"}),
         "exactly one",

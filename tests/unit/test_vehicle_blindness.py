@@ -3,6 +3,7 @@
 import pytest
 from vehicle_harness import Harness
 
+from hil.faults import GATE, size_parameters
 from hil.mavlink import (
     Command,
     CommandAck,
@@ -76,7 +77,8 @@ def test_sim_parameters_do_not_exist_on_the_stations_port(rescue: Scenario) -> N
 def test_the_injector_sees_them(rescue: Scenario) -> None:
     rover = Harness(rescue)
     rover.tell(rover.injector.param_request_list(2), "injector")
-    assert [p.name for p in rover.values(ParamValue, "injector")] == ["SIM_GPS1_STUCK"]
+    names = [p.name for p in rover.values(ParamValue, "injector")]
+    assert names == sorted([GATE, *(size.parameter for _, size in size_parameters())])
     rover.tell(rover.injector.param_set(2, "SIM_GPS1_STUCK", 3.0), "injector")
     assert [p.value for p in rover.values(ParamValue, "injector")] == [3.0]
     assert rover.datagrams["gcs"] == []
@@ -96,9 +98,12 @@ def test_acks_and_texts_of_an_injection_stay_on_its_port(rescue: Scenario) -> No
         ((101, 1, 5), Result.DENIED),  # there are four motors
         ((101, 1, -1), Result.DENIED),
         ((4, 2, 2), Result.DENIED),  # there is one GPS
-        ((101, 2, 1), Result.UNSUPPORTED),  # a motor can't be stuck yet
-        ((4, 1, 0), Result.UNSUPPORTED),
+        ((101, 5, 1), Result.UNSUPPORTED),  # a motor can't be slow
+        ((3, 1, 0), Result.UNSUPPORTED),  # there is no barometer
         ((0, 1, 0), Result.UNSUPPORTED),
+        ((101, 4, 1), Result.DENIED),  # SIM_ENGINE_MUL is 1: that would break nothing
+        ((4, 8, 1), Result.DENIED),  # no drift speed is set
+        ((4, 1, 0), Result.ACCEPTED),
         ((101, 0, 0), Result.ACCEPTED),
     ],
 )
@@ -110,8 +115,19 @@ def test_the_ack_says_only_what_is_in_effect(
     assert [a.result for a in rover.values(CommandAck, "injector")] == [result]
 
 
+def test_the_gate_is_shut_until_it_is_opened(rescue: Scenario) -> None:
+    rover = Harness(rescue)
+    rover.tell(rover.injector.inject_failure(2, 101, 1, 3), "injector")
+    assert [a.result for a in rover.values(CommandAck, "injector")] == [Result.DENIED]
+    assert [t.text for t in rover.values(StatusText, "injector")] == [f"Failure: {GATE} is 0"]
+    rover.guided()
+    rover.run(1.0, (0.0, 0.5))
+    assert rover.pwm[2] > 1600
+
+
 def test_instances_as_a_bit_mask(rescue: Scenario) -> None:
     rover = Harness(rescue)
+    rover.tell(rover.injector.param_set(2, GATE, 1.0), "injector")
     mask = (101.0, 1.0, float("nan"), 0b1100)
     command = rover.injector.command_long(2, Command.INJECT_FAILURE, *mask)
     rover.tell(command, "injector")

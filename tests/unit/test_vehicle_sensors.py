@@ -8,6 +8,7 @@ import pytest
 
 from hil.physics_link import AT_REST_MPS2, PhysicsState
 from hil.scenario import Sensors
+from sim_vehicles.damage import GpsDamage
 from sim_vehicles.estimator import Estimator
 from sim_vehicles.sensors import Gps, GpsFix, InertialSensors
 
@@ -36,8 +37,12 @@ def driving(tick: int) -> PhysicsState:
     )
 
 
+def stuck(mask: int) -> GpsDamage:
+    return GpsDamage(stuck_mask=mask)
+
+
 def fixes(gps: Gps, count: int, stuck_mask: int = 0) -> list[GpsFix]:
-    sampled = (gps.sample(at(REST, k), stuck_mask) for k in range(count))
+    sampled = (gps.sample(at(REST, k), stuck(stuck_mask)) for k in range(count))
     return [fix for fix in sampled if fix is not None]
 
 
@@ -62,9 +67,9 @@ def test_a_stuck_gps_at_rest_is_not_to_be_told_from_a_healthy_one() -> None:
 
 
 def test_noise_is_the_same_whether_stuck_or_not() -> None:
-    healthy, stuck = Gps(NOISE, 1, 2), Gps(NOISE, 1, 2)
+    healthy, broken = Gps(NOISE, 1, 2), Gps(NOISE, 1, 2)
     for k in range(500):
-        a, b = healthy.sample(driving(k), 0), stuck.sample(driving(k), ALL)
+        a, b = healthy.sample(driving(k)), broken.sample(driving(k), stuck(ALL))
         assert a is not None
         assert b is not None
         now, frozen = driving(k), driving(0)
@@ -76,9 +81,9 @@ def test_noise_is_the_same_whether_stuck_or_not() -> None:
 def test_a_stuck_axis_freezes_the_mean_it_had_at_onset() -> None:
     gps = Gps(QUIET, 0, 1)
     for k in range(50):
-        gps.sample(driving(k), 0)
+        gps.sample(driving(k))
     for k in range(50, 150):
-        fix = gps.sample(driving(k), EAST)
+        fix = gps.sample(driving(k), stuck(EAST))
         assert fix is not None
         assert fix.position_m[0] == pytest.approx(driving(k).position_m[0], abs=1e-6)
         assert fix.position_m[1] == pytest.approx(driving(50).position_m[1], abs=1e-6)
@@ -88,7 +93,7 @@ def test_a_stuck_axis_freezes_the_mean_it_had_at_onset() -> None:
 def test_clearing_brings_the_truth_back_and_a_second_onset_freezes_anew() -> None:
     gps = Gps(QUIET, 0, 1)
     masks = [NORTH] * 10 + [0] * 10 + [NORTH] * 10
-    seen = [gps.sample(driving(k), mask) for k, mask in enumerate(masks)]
+    seen = [gps.sample(driving(k), stuck(mask)) for k, mask in enumerate(masks)]
     for k, expected in ((9, 0), (19, 19), (29, 20)):
         fix = seen[k]
         assert fix is not None
@@ -98,7 +103,7 @@ def test_clearing_brings_the_truth_back_and_a_second_onset_freezes_anew() -> Non
 def test_an_axis_freed_while_another_stays_stuck_freezes_anew() -> None:
     gps = Gps(QUIET, 0, 1)
     masks = [ALL] * 10 + [EAST] * 10 + [ALL] * 10
-    fix = [gps.sample(driving(k), mask) for k, mask in enumerate(masks)][-1]
+    fix = [gps.sample(driving(k), stuck(mask)) for k, mask in enumerate(masks)][-1]
     assert fix is not None
     assert fix.position_m[0] == pytest.approx(driving(20).position_m[0], abs=1e-6)
     assert fix.position_m[1] == pytest.approx(driving(0).position_m[1], abs=1e-6)
@@ -117,7 +122,7 @@ def estimated(noise: Sensors, seconds: float) -> tuple[list[float], list[float],
     for k in range(round(seconds * 50)):
         state = driving(k)
         estimator.inertial(inertial.sample(state), 0.02)
-        fix = gps.sample(state, 0)
+        fix = gps.sample(state)
         if fix is not None:
             estimator.gps(fix)
         if k > 250:
@@ -142,7 +147,7 @@ def test_the_estimator_is_ready_after_a_second_of_fixes() -> None:
     gps, estimator = Gps(Sensors(gps_hz=10), 0, 1), Estimator(Sensors(gps_hz=10))
     ready_at = []
     for k in range(100):
-        fix = gps.sample(at(REST, k), 0)
+        fix = gps.sample(at(REST, k))
         if fix is not None:
             estimator.gps(fix)
         if estimator.ready:

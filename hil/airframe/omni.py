@@ -1,0 +1,37 @@
+"""Omnidirectional rovers: four omni wheels, in two layouts."""
+
+import math
+from collections.abc import Sequence
+
+from hil.airframe.model import Airframe, Motor
+
+Pair = tuple[float, float]
+
+
+def _omni(name: str, places: Sequence[Pair], directions: Sequence[Pair]) -> Airframe:
+    """Four omni wheels at 0.2 m. An 8 kg research rover.
+
+    16 N of stall force a wheel and 1.6 m/s free speed give a time constant of 0.4 s and 3 m/s2
+    at standstill; c_rr = 0.1 is a small rubber wheel on grass (Bekker-type tables give 0.05-0.15).
+    A blocked wheel skids at 0.7 of its quarter of the weight (rubber on dry ground: 0.6-0.8).
+    """
+    motors = tuple(
+        Motor(p, d, 16.0, 1.6, grip_n=13.7) for p, d in zip(places, directions, strict=True)
+    )
+    return Airframe(name, 0.3, 8.0, 0.36, 0.10, 0.6, 1.0, motors)
+
+
+# left, right, front, rear: one pair drives x, the other y (ArduPilot FRAME_TYPE 3)
+OMNI_PLUS = _omni(
+    "omni_plus",
+    ((0.0, -0.2), (0.0, 0.2), (0.2, 0.0), (-0.2, 0.0)),
+    ((1.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, 1.0)),
+)
+
+# front left, front right, rear left, rear right: every wheel drives x and y (FRAME_TYPE 2)
+_H = math.sqrt(0.5)
+OMNI_X = _omni(
+    "omni_x",
+    ((0.2 * _H, -0.2 * _H), (0.2 * _H, 0.2 * _H), (-0.2 * _H, -0.2 * _H), (-0.2 * _H, 0.2 * _H)),
+    ((_H, _H), (_H, -_H), (_H, -_H), (_H, _H)),
+)
