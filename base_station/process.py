@@ -128,3 +128,7 @@ def _say_text(line: dict[str, Any]) -> None:
             print(json.dumps(line["outcome"], indent=2), flush=True)
         case _:
             pass
+
+
+if __name__ == "__main__":
+    main()
