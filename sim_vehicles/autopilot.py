@@ -5,18 +5,33 @@ that people shall read. Wording and rules follow ArduPilot Rover.
 """
 
 from dataclasses import dataclass, replace
+from enum import Enum
 
 from hil.mavlink import Result, RoverMode, Severity, StatusText, SystemStatus
 
 TARGET_TIMEOUT_S = 3.0
-IMPLEMENTED = frozenset({RoverMode.MANUAL, RoverMode.HOLD, RoverMode.GUIDED})
+IMPLEMENTED = frozenset(
+    {RoverMode.MANUAL, RoverMode.HOLD, RoverMode.GUIDED, RoverMode.AUTO, RoverMode.RTL}
+)
+NEED_POSITION = frozenset({RoverMode.GUIDED, RoverMode.AUTO, RoverMode.RTL})
+
+
+class Failsafe(Enum):
+    """What can trip, by the name that people read."""
+
+    GCS = "GCS Failsafe"
+    GPS = "GPS Failsafe"
+    BATTERY_LOW = "Battery Failsafe"
+    BATTERY_CRITICAL = "Critical Battery Failsafe"
+    FENCE = "Fence Breach"
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What GUIDED is to do: drive at a velocity, or to a point (north, east). One of both is set.
+    """Where to drive: at a velocity, or to a point (north, east). One of both is set.
 
-    Yaw is a heading in NED (rad), yaw rate in rad/s; None leaves the heading alone.
+    Yaw is a heading in NED (rad), yaw rate in rad/s; None leaves the heading alone. A point may
+    come with a speed not to exceed.
     """
 
     time_s: float
@@ -24,6 +39,7 @@ class Target:
     position_m: tuple[float, float] | None = None
     yaw_rad: float | None = None
     yaw_rate_radps: float | None = None
+    speed_mps: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,13 +48,26 @@ class Autopilot:
 
     mode: RoverMode = RoverMode.HOLD
     armed: bool = False
-    gcs_lost: bool = False
+    tripped: frozenset[Failsafe] = frozenset()
     target: Target | None = None
 
     @property
     def drives(self) -> bool:
         """Whether the motors get power at all."""
         return self.armed and self.mode is not RoverMode.HOLD
+
+
+@dataclass(frozen=True, slots=True)
+class Readiness:
+    """What transitions depend on: a position estimate, a mission, and complaints against arming."""
+
+    position: bool
+    mission: bool = False
+    complaints: tuple[str, ...] = ()
+
+    @property
+    def to_arm(self) -> bool:
+        return self.position and not self.complaints
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,13 +79,15 @@ class Transition:
     texts: tuple[StatusText, ...] = ()
 
 
-def arm(state: Autopilot, ready: bool) -> Transition:
-    """Arm if the estimator is ready."""
+def arm(state: Autopilot, ready: Readiness) -> Transition:
+    """Arm if nothing speaks against it; otherwise every reason is told."""
     if state.armed:
         return Transition(state)
-    if not ready:
-        text = StatusText(Severity.CRITICAL, "Arm: waiting for position estimate")
-        return Transition(state, Result.FAILED, (text,))
+    if not ready.to_arm:
+        waiting = () if ready.position else ("waiting for position estimate",)
+        reasons = (*waiting, *ready.complaints)
+        texts = tuple(StatusText(Severity.CRITICAL, f"Arm: {reason}") for reason in reasons)
+        return Transition(state, Result.FAILED, texts)
     text = StatusText(Severity.INFO, "Throttle armed")
     return Transition(replace(state, armed=True, target=None), Result.ACCEPTED, (text,))
 
@@ -69,7 +100,7 @@ def disarm(state: Autopilot) -> Transition:
     return Transition(replace(state, armed=False, target=None), Result.ACCEPTED, (text,))
 
 
-def set_mode(state: Autopilot, number: int, ready: bool) -> Transition:
+def set_mode(state: Autopilot, number: int, ready: Readiness) -> Transition:
     """Change mode. A mode that is not there, or not possible now, is refused with the reason."""
     try:
         mode = RoverMode(number)
@@ -77,10 +108,12 @@ def set_mode(state: Autopilot, number: int, ready: bool) -> Transition:
         return _refused(state, f"No such mode {number}", Result.DENIED)
     if mode not in IMPLEMENTED:
         return _refused(state, f"Mode {mode.name} is not implemented", Result.UNSUPPORTED)
-    if mode is RoverMode.GUIDED and not ready:
-        return _refused(state, "Mode GUIDED: waiting for position estimate", Result.FAILED)
     if mode is state.mode:
         return Transition(state)
+    if mode in NEED_POSITION and (not ready.position or Failsafe.GPS in state.tripped):
+        return _refused(state, f"Mode {mode.name}: waiting for position estimate", Result.FAILED)
+    if mode is RoverMode.AUTO and not ready.mission:
+        return _refused(state, "Mode AUTO: no mission", Result.FAILED)
     return Transition(replace(state, mode=mode, target=None))
 
 
@@ -104,28 +137,38 @@ def check_target(state: Autopilot, now_s: float) -> Transition:
     return Transition(replace(state, target=None), texts=(text,) if state.armed else ())
 
 
-def check_gcs(state: Autopilot, silence_s: float | None, timeout_s: float) -> Transition:
-    """HOLD when an armed vehicle has not heard its station for longer than the time-out.
+def check(state: Autopilot, which: Failsafe, tripped: bool, action: RoverMode | None) -> Transition:
+    """Trip a failsafe of an armed vehicle, or clear it.
 
-    `silence_s` is the time since the last heartbeat; None while there is nothing to miss.
-    A heartbeat clears the failsafe but not the HOLD.
+    It acts once, when it trips: `action` is the mode to go to, None only reports. Clearing does not
+    bring the old mode back.
     """
-    lost = silence_s is not None and silence_s > timeout_s
-    if lost == state.gcs_lost:
+    if tripped == (which in state.tripped):
         return Transition(state)
-    if not lost:
-        text = StatusText(Severity.INFO, "GCS Failsafe Cleared")
-        return Transition(replace(state, gcs_lost=False), texts=(text,))
+    if not tripped:
+        text = StatusText(Severity.INFO, f"{which.value} Cleared")
+        return Transition(replace(state, tripped=state.tripped - {which}), texts=(text,))
     if not state.armed:
         return Transition(state)
-    text = StatusText(Severity.WARNING, "GCS Failsafe: Hold")
-    held = replace(state, gcs_lost=True, mode=RoverMode.HOLD, target=None)
-    return Transition(held, texts=(text,))
+    does = "Report" if action is None else action.name.capitalize()
+    text = StatusText(Severity.WARNING, f"{which.value}: {does}")
+    state = replace(state, tripped=state.tripped | {which})
+    if action is not None and action is not state.mode:
+        state = replace(state, mode=action, target=None)
+    return Transition(state, texts=(text,))
+
+
+def check_sticks(state: Autopilot, released: bool) -> Transition:
+    """HOLD when whoever drove in MANUAL has let go."""
+    if not released or not state.armed or state.mode is not RoverMode.MANUAL:
+        return Transition(state)
+    text = StatusText(Severity.WARNING, "Radio Failsafe: Hold")
+    return Transition(replace(state, mode=RoverMode.HOLD, target=None), texts=(text,))
 
 
 def system_status(state: Autopilot, ready: bool) -> SystemStatus:
     """MAV_STATE for the heartbeat."""
-    if state.gcs_lost:
+    if state.tripped:
         return SystemStatus.CRITICAL
     if state.armed:
         return SystemStatus.ACTIVE

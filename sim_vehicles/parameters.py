@@ -72,6 +72,10 @@ def rover_parameters(sysid: int, station_sysid: int, airframe: Airframe) -> Para
             _fixed("FORMAT_VERSION", 16),
             _fixed("FRAME_CLASS", 1, int8),
             _fixed("FRAME_TYPE", 3, int8),  # omni plus
+            Parameter("FENCE_ACTION", 2, 0, 2, int8),  # 0 report, 1 RTL, 2 hold
+            Parameter("FENCE_ENABLE", 0, 0, 1, int8),
+            Parameter("FENCE_RADIUS", 300, 0.5, 10_000),
+            Parameter("FENCE_TYPE", 6, 0, 7, int8),  # bits: 2 circle around home, 4 zones
             Parameter("FS_GCS_ENABLE", 1, 0, 1, int8),
             Parameter("FS_TIMEOUT", 5, 1, 100),
             _fixed("FS_ACTION", 2, int8),  # hold
@@ -82,6 +86,7 @@ def rover_parameters(sysid: int, station_sysid: int, airframe: Airframe) -> Para
             *(_fixed(f"SERVO{i}_TRIM", 1500) for i in range(1, len(airframe.motors) + 1)),
             Parameter("SYSID_MYGCS", station_sysid, 1, 255, int16),
             _fixed("SYSID_THISMAV", sysid),
+            Parameter("WP_RADIUS", 0.2, 0.05, 100),
             Parameter("WP_SPEED", limit_mps, 0.05, limit_mps),
         )
     )

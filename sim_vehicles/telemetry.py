@@ -15,6 +15,7 @@ from hil.mavlink import (
     Battery,
     Capability,
     ExtendedSysState,
+    FenceStatus,
     FixType,
     GlobalPosition,
     GpsOrigin,
@@ -37,7 +38,12 @@ ON_GROUND = 1  # MAV_LANDED_STATE_ON_GROUND
 SATELLITES, HDOP = 18, 0.7
 CPU_LOAD = 0.25
 VERSION = (4, 6, 0, 255)  # the ArduPilot release whose behaviour is followed; 255 is 'official'
-_MODE_FLAGS = {RoverMode.MANUAL: MODE_FLAG_MANUAL, RoverMode.GUIDED: MODE_FLAG_GUIDED}
+_MODE_FLAGS = {
+    RoverMode.MANUAL: MODE_FLAG_MANUAL,
+    RoverMode.GUIDED: MODE_FLAG_GUIDED,
+    RoverMode.AUTO: MODE_FLAG_GUIDED,
+    RoverMode.RTL: MODE_FLAG_GUIDED,
+}
 _ALWAYS_HEALTHY = (
     Sensor.GYRO | Sensor.ACCEL | Sensor.MAG | Sensor.YAW_POSITION | Sensor.XY_POSITION_CONTROL
 ) | (Sensor.MOTOR_OUTPUTS | Sensor.BATTERY)
@@ -58,6 +64,8 @@ class Snapshot:
     home_m: Vector | None
     pwm_us: tuple[int, ...]
     battery: BatteryState
+    mission: MissionCurrent
+    fence: FenceStatus | None  # None while it is switched off
 
 
 def heartbeat(s: Snapshot) -> Heartbeat:
@@ -76,6 +84,9 @@ def sys_status(s: Snapshot) -> SysStatus:
         health |= int(Sensor.GPS)
     if s.ready:
         health |= int(_WHEN_READY)
+    if s.fence is not None:
+        present |= int(Sensor.GEOFENCE)
+        health |= 0 if s.fence.breached else int(Sensor.GEOFENCE)
     battery = (s.battery.voltage_v, s.battery.current_a, s.battery.remaining_percent)
     return SysStatus(present, present, health, CPU_LOAD, *battery)
 
@@ -135,16 +146,24 @@ def gps_origin(s: Snapshot) -> GpsOrigin | None:
     return GpsOrigin(s.origin.lat_deg, s.origin.lon_deg, s.origin.alt_m)
 
 
-def mission_current(_s: Snapshot) -> MissionCurrent:
-    return MissionCurrent(0, 0)
+def mission_current(s: Snapshot) -> MissionCurrent:
+    return s.mission
+
+
+def fence_status(s: Snapshot) -> FenceStatus | None:
+    return s.fence
 
 
 def autopilot_version(s: Snapshot) -> AutopilotVersion:
     capabilities = (
         Capability.PARAM_FLOAT
         | Capability.PARAM_ENCODE_C_CAST
+        | Capability.MISSION_INT
+        | Capability.MISSION_FENCE
+        | Capability.MISSION_RALLY
         | Capability.COMMAND_INT
         | Capability.SET_POSITION_TARGET_LOCAL_NED
+        | Capability.SET_POSITION_TARGET_GLOBAL_INT
         | Capability.MAVLINK2
     )
     return AutopilotVersion(int(capabilities), VERSION, s.sysid)

@@ -3,37 +3,55 @@
 Time is physics time. One `step` is one frame of the autopilot: physics state in, PWM out.
 """
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Literal
 
-from hil.airframe import output_to_pwm
+from hil.airframe import mix, output_to_pwm
 from hil.frames import wrap_pi
-from hil.mavlink import Heartbeat, Message, MessageId, Result, RoverMode, Severity, StatusText
+from hil.mavlink import (
+    FenceStatus,
+    Heartbeat,
+    HomePosition,
+    Message,
+    MessageId,
+    Result,
+    RoverMode,
+    Severity,
+    StatusText,
+)
 from hil.physics_link import PhysicsState, pad_channels
 from hil.scenario import Scenario
 from sim_vehicles import telemetry
 from sim_vehicles.autopilot import (
     Autopilot,
-    Target,
+    Failsafe,
+    Readiness,
     Transition,
-    accept_target,
-    check_gcs,
+    check,
+    check_sticks,
     check_target,
 )
 from sim_vehicles.battery import BatteryState, drain
 from sim_vehicles.control import Drive, Memory, drive_at, velocity_towards
 from sim_vehicles.damage import MotorOutputs
 from sim_vehicles.estimator import Estimate, Estimator
+from sim_vehicles.failsafes import Breaches, Signs, trips
+from sim_vehicles.mission import Surroundings
+from sim_vehicles.navigator import Navigator
 from sim_vehicles.parameters import rover_parameters
 from sim_vehicles.port import Port
 from sim_vehicles.sensors import Gps, GpsFix, InertialSensors, Vector
-from sim_vehicles.services import ftp, mission, time
+from sim_vehicles.services import ftp, time
 from sim_vehicles.services.commands import CommandService
 from sim_vehicles.services.failure import FailureService, injection_parameters
+from sim_vehicles.services.fence import FenceService
+from sim_vehicles.services.mission import MissionService
 from sim_vehicles.services.mode import Change, ModeService
 from sim_vehicles.services.parameters import ParameterService
+from sim_vehicles.services.piloting import PilotingService
 from sim_vehicles.services.service import Replies, Request, merged
 from sim_vehicles.services.setpoints import SetpointService
 from sim_vehicles.services.streams import Builder, StreamService
@@ -55,6 +73,7 @@ _TELEMETRY: Mapping[MessageId, Callable[[Snapshot], Message | None]] = {
     MessageId.GPS_GLOBAL_ORIGIN: telemetry.gps_origin,
     MessageId.MISSION_CURRENT: telemetry.mission_current,
     MessageId.AUTOPILOT_VERSION: telemetry.autopilot_version,
+    MessageId.FENCE_STATUS: telemetry.fence_status,
 }
 
 
@@ -88,6 +107,8 @@ class Vehicle:
         self._estimator = Estimator(scenario.sensors)
         self._parameters = rover_parameters(sysid, scenario.links.station_sysid, member.frame)
         self._autopilot = Autopilot()
+        self._navigator = Navigator(self._origin)
+        self._breaches = Breaches()
         self._battery = BatteryState()
         self._memory = Memory()
         self._outputs = MotorOutputs(member.frame)
@@ -104,14 +125,19 @@ class Vehicle:
             number: partial(self._build, build) for number, build in _TELEMETRY.items()
         }
         modes = ModeService(self._apply)
-        setpoints = SetpointService(self._estimator.estimate, self._accept)
+        setpoints = SetpointService(self._origin, self._estimator.estimate, self._apply)
+        fence = FenceService(self._parameters, self._navigator)
+        self._missions = MissionService(self._navigator, self._origin, self._home, self._apply)
+        self._piloting = PilotingService()
         streams = StreamService(builders, default_rates_hz(telemetry_hz))
+        commanded = (streams, modes, setpoints, fence, self._missions)
+        commands = CommandService({k: v for s in commanded for k, v in s.executors().items()})
+        parameters = ParameterService(self._parameters)
+        served = (commands, parameters, modes, setpoints, self._piloting, self._missions, streams)
         gcs = merged(
             {Heartbeat: self._heard},
-            CommandService({**streams.executors(), **modes.executors()}).handlers(),
-            ParameterService(self._parameters).handlers(),
-            *(service.handlers() for service in (modes, setpoints, streams)),
-            *(module.handlers() for module in (time, mission, ftp)),
+            *(service.handlers() for service in served),
+            *(module.handlers() for module in (time, ftp)),
         )
         sizes = injection_parameters()
         self._failures = FailureService(sizes, self._drive.airframe)
@@ -119,7 +145,7 @@ class Vehicle:
         injector = merged(
             CommandService({**beats.executors(), **self._failures.executors()}).handlers(),
             ParameterService(sizes).handlers(),
-            *(module.handlers() for module in (time, mission, ftp)),
+            *(module.handlers() for module in (time, ftp)),
         )
         self._ports = {"gcs": Port(self._sysid, gcs), "injector": Port(self._sysid, injector)}
         self._streams = (("gcs", streams), ("injector", beats))
@@ -143,6 +169,7 @@ class Vehicle:
             dt_s = state.time_s - last_s
             self._sense(state, dt_s)
             self._watch(state.time_s)
+            self._navigate(state.time_s)
             self._pwm = self._control(dt_s)
             for port, streams in self._streams:
                 messages = streams.step(state.time_s)
@@ -165,23 +192,56 @@ class Vehicle:
 
     def _watch(self, now_s: float) -> None:
         """Time-outs and failsafes."""
-        silence_s = None
-        if self._gcs_heard_s is not None and self._parameters["FS_GCS_ENABLE"]:
-            silence_s = now_s - self._gcs_heard_s
-        timeout_s = self._parameters["FS_TIMEOUT"]
-        self._apply(lambda state, _ready: check_gcs(state, silence_s, timeout_s))
+        self._breaches = self._breaches.at(now_s, self._is_outside())
+        heard = self._gcs_heard_s
+        signs = Signs(
+            gcs_silence_s=None if heard is None else now_s - heard,
+            outside=self._breaches.outside,
+            mode=self._autopilot.mode,
+        )
+        for trip in trips(signs, self._parameters):
+            self._apply(partial(_checked, trip.which, trip.tripped, trip.action))
+        released = self._piloting.sticks.are_released(now_s)
+        self._apply(lambda state, _ready: check_sticks(state, released))
         self._apply(lambda state, _ready: check_target(state, now_s))
+
+    def _is_outside(self) -> bool:
+        if self._home_m is None or not self._parameters["FENCE_ENABLE"]:
+            return False
+        here, home = self._estimator.estimate().position_m[:2], self._home_m[:2]
+        kinds, radius_m = int(self._parameters["FENCE_TYPE"]), self._parameters["FENCE_RADIUS"]
+        return self._navigator.is_outside(here, home, kinds, radius_m)
+
+    def _navigate(self, now_s: float) -> None:
+        """In AUTO and RTL the navigator sets the target."""
+        self._tell(self._missions.step(now_s))
+        around = Surroundings(
+            now_s,
+            self._estimator.estimate().position_m[:2],
+            (self._home_m or (0.0, 0.0, 0.0))[:2],
+            self._origin,
+            self._parameters["WP_RADIUS"],
+        )
+        mode = self._autopilot.mode if self._autopilot.armed else RoverMode.HOLD
+        target, told = self._navigator.steer(mode, around)
+        if target is not None:
+            self._autopilot = replace(self._autopilot, target=target)
+        self._tell(told)
 
     def _control(self, dt_s: float) -> tuple[int, ...]:
         """PWM as commanded, 16 channels."""
         estimate = self._estimator.estimate()
-        if not self._autopilot.drives or self._autopilot.mode is not RoverMode.GUIDED:
+        if not self._autopilot.drives:
             self._memory = Memory(yaw_rad=estimate.yaw_rad)
             self._battery = drain(self._battery, (), dt_s)
-            output = 0.0 if self._autopilot.drives else None
-            return pad_channels([output_to_pwm(output)] * len(self._drive.airframe.motors))
-        velocity = self._aim(estimate, dt_s)
-        outputs, self._memory = drive_at(self._drive, self._memory, estimate, velocity, dt_s)
+            return pad_channels([output_to_pwm(None)] * len(self._drive.airframe.motors))
+        if self._autopilot.mode is RoverMode.MANUAL:
+            sticks = self._piloting.sticks
+            airframe = self._drive.airframe
+            outputs = mix(airframe, sticks.throttle, sticks.lateral, sticks.steering)
+        else:
+            velocity = self._aim(estimate, dt_s)
+            outputs, self._memory = drive_at(self._drive, self._memory, estimate, velocity, dt_s)
         self._battery = drain(self._battery, outputs, dt_s)
         return pad_channels([output_to_pwm(output) for output in outputs])
 
@@ -196,7 +256,8 @@ class Vehicle:
             yaw_rad = wrap_pi(self._memory.yaw_rad + target.yaw_rate_radps * dt_s)
             self._memory = replace(self._memory, yaw_rad=yaw_rad)
         if target.position_m is not None:
-            return velocity_towards(target.position_m, estimate, self._parameters["WP_SPEED"])
+            limit_mps = min(self._parameters["WP_SPEED"], target.speed_mps or math.inf)
+            return velocity_towards(target.position_m, estimate, limit_mps)
         return target.velocity_mps or (0.0, 0.0)
 
     def _broken(self, pwm_us: tuple[int, ...]) -> tuple[int, ...]:
@@ -204,24 +265,30 @@ class Vehicle:
         return self._outputs.broken(self._failures.active.motors, pwm_us, self._now_s or 0.0)
 
     def _apply(self, change: Change) -> Result:
-        transition: Transition = change(self._autopilot, self._estimator.ready)
+        transition: Transition = change(self._autopilot, self._readiness())
         before, self._autopilot = self._autopilot, transition.state
         if (before.mode, before.armed) != (self._autopilot.mode, self._autopilot.armed):
             self._memory = Memory(yaw_rad=self._estimator.estimate().yaw_rad)
+            self._piloting.centre()
         self._tell(transition.texts)
         return transition.result
 
-    def _accept(self, target: Target) -> None:
-        self._autopilot = accept_target(self._autopilot, target)
+    def _readiness(self) -> Readiness:
+        outside = ("vehicle outside fence",) if self._breaches.outside else ()
+        return Readiness(self._estimator.ready, self._navigator.has_mission, outside)
+
+    def _home(self) -> HomePosition | None:
+        return telemetry.home_position(self._snapshot())
 
     def _heard(self, request: Request) -> Replies:
         if request.sysid == self._parameters["SYSID_MYGCS"]:
             self._gcs_heard_s = request.now_s
         return []
 
-    def _tell(self, texts: tuple[StatusText, ...]) -> None:
-        for port in self._ports.values() if texts else ():
-            port.send(texts)
+    def _tell(self, messages: Sequence[Message]) -> None:
+        """Texts go to everybody, the rest to the station's port."""
+        for name, port in self._ports.items() if messages else ():
+            port.send(m for m in messages if name == "gcs" or isinstance(m, StatusText))
 
     def _build(self, build: Callable[[Snapshot], Message | None]) -> Message | None:
         return build(self._snapshot())
@@ -232,10 +299,21 @@ class Vehicle:
             now_s=self._now_s or 0.0,
             origin=self._origin,
             estimate=self._estimator.estimate(),
-            ready=self._estimator.ready,
+            ready=self._readiness().to_arm,
             autopilot=self._autopilot,
             fix=self._fix,
             home_m=self._home_m,
             pwm_us=self._pwm,
             battery=self._battery,
+            mission=self._navigator.current(),
+            fence=self._fence(),
         )
+
+    def _fence(self) -> FenceStatus | None:
+        return self._breaches.status() if self._parameters["FENCE_ENABLE"] else None
+
+
+def _checked(
+    which: Failsafe, tripped: bool, action: RoverMode | None, state: Autopilot, _ready: Readiness
+) -> Transition:
+    return check(state, which, tripped, action)

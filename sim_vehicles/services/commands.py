@@ -10,10 +10,14 @@ from sim_vehicles.services.service import Handlers, Replies, Request
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """A command with its 7 params; NaN where the sender gave none."""
+    """A command with its 7 params; NaN where the sender gave none.
+
+    `frame` is the MAV_FRAME of a COMMAND_INT, whose params 5 and 6 are integers; else None.
+    """
 
     now_s: float
     params: tuple[float, ...]
+    frame: int | None = None
 
     def integer(self, number: int) -> int | None:
         """Param `number` (from 1) if it is a whole number."""
@@ -44,15 +48,16 @@ class CommandService:
         return {CommandLong: self._long, CommandInt: self._int}
 
     def _long(self, request: Request) -> Replies:
-        return self._execute(request, request.value.params)
+        return self._execute(request, Order(request.now_s, request.value.params))
 
     def _int(self, request: Request) -> Replies:
         value: CommandInt = request.value
-        return self._execute(request, (*value.params, float(value.x), float(value.y), value.z))
+        params = (*value.params, float(value.x), float(value.y), value.z)
+        return self._execute(request, Order(request.now_s, params, value.frame))
 
-    def _execute(self, request: Request, params: tuple[float, ...]) -> Replies:
+    def _execute(self, request: Request, order: Order) -> Replies:
         number = request.value.command
         executor = self._executors.get(number)
-        outcome = executor(Order(request.now_s, params)) if executor else UNSUPPORTED
+        outcome = executor(order) if executor else UNSUPPORTED
         ack = CommandAck(number, outcome.result, request.sysid, request.compid)
         return [ack, *outcome.messages]

@@ -3,15 +3,15 @@
 from collections.abc import Callable, Mapping
 
 from hil.mavlink import MODE_FLAG_CUSTOM, Command, Result, SetMode
-from sim_vehicles.autopilot import Autopilot, Transition, arm, disarm, set_mode
+from sim_vehicles.autopilot import Autopilot, Readiness, Transition, arm, disarm, set_mode
 from sim_vehicles.services.commands import DENIED, Executor, Order, Outcome
 from sim_vehicles.services.service import Handlers, Replies, Request
 
-Change = Callable[[Autopilot, bool], Transition]
+Change = Callable[[Autopilot, Readiness], Transition]
 
 
 class ModeService:
-    """Asks for transitions. `apply` puts one into effect, given whether the estimator is ready."""
+    """Asks for transitions. `apply` puts one into effect, given what the vehicle is ready for."""
 
     def __init__(self, apply: Callable[[Change], Result]) -> None:
         self._apply = apply

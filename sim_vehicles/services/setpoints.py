@@ -1,34 +1,103 @@
-"""Set-points: SET_POSITION_TARGET_LOCAL_NED to a target in NED (m, m/s, rad)."""
+"""Set-points: SET_POSITION_TARGET_LOCAL_NED and _GLOBAL_INT, MAV_CMD_DO_REPOSITION.
+
+All become a target in NED (m, m/s, rad).
+"""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
-from hil.frames import body_to_ned, wrap_pi
-from hil.mavlink import Frame, LocalSetpoint
-from sim_vehicles.autopilot import Target
+from hil.frames import Origin, body_to_ned, wgs84_to_ned, wrap_pi
+from hil.mavlink import (
+    Command,
+    Frame,
+    GlobalFrame,
+    GlobalSetpoint,
+    LocalSetpoint,
+    Result,
+    RoverMode,
+    Vector,
+)
+from sim_vehicles.autopilot import Autopilot, Readiness, Target, Transition, accept_target, set_mode
 from sim_vehicles.estimator import Estimate
+from sim_vehicles.services.commands import DENIED, Executor, Order, Outcome
+from sim_vehicles.services.mode import Change
 from sim_vehicles.services.service import Handlers, Replies, Request
 
 ABSURD_MPS = 100.0
 ABSURD_M = 100_000.0
 ABSURD_RAD = 100.0
+CHANGE_MODE = 1  # MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
 _BODY_FRAMES = (Frame.BODY_NED, Frame.BODY_OFFSET_NED)
 
 
 class SetpointService:
     """Hands accepted targets on. There is no answer to a set-point, as MAVLink has none."""
 
-    def __init__(self, estimate: Callable[[], Estimate], accept: Callable[[Target], None]) -> None:
-        self._estimate, self._accept = estimate, accept
+    def __init__(
+        self,
+        origin: Origin,
+        estimate: Callable[[], Estimate],
+        apply: Callable[[Change], Result],
+    ) -> None:
+        self._origin, self._estimate, self._apply = origin, estimate, apply
 
     def handlers(self) -> Handlers:
-        return {LocalSetpoint: self._setpoint}
+        return {LocalSetpoint: self._local, GlobalSetpoint: self._global}
 
-    def _setpoint(self, request: Request) -> Replies:
-        target = to_target(request.value, self._estimate(), request.now_s)
-        if target is not None:
-            self._accept(target)
+    def executors(self) -> Mapping[int, Executor]:
+        return {Command.DO_REPOSITION: self._reposition}
+
+    def _local(self, request: Request) -> Replies:
+        return self._accept(to_target(request.value, self._estimate(), request.now_s))
+
+    def _global(self, request: Request) -> Replies:
+        local = to_local(request.value, self._origin)
+        if local is not None:
+            self._accept(to_target(local, self._estimate(), request.now_s))
         return []
+
+    def _accept(self, target: Target | None) -> Replies:
+        if target is not None:
+            self._apply(lambda state, _ready: Transition(accept_target(state, target)))
+        return []
+
+    def _reposition(self, order: Order) -> Outcome:
+        """As COMMAND_INT only. Outside GUIDED the flag CHANGE_MODE is needed."""
+        if order.frame is None:
+            return Outcome(Result.COMMAND_INT_ONLY)
+        flags, lat, lon = order.integer(2), order.params[4] / 1e7, order.params[5] / 1e7
+        point = _ned(lat, lon, self._origin)
+        if order.frame not in tuple(GlobalFrame) or flags is None or point is None:
+            return DENIED
+        speed = order.params[0]
+        target = Target(order.now_s, position_m=point, speed_mps=speed if speed > 0.0 else None)
+        return Outcome(
+            self._apply(lambda state, ready: reposition(state, ready, target, flags & CHANGE_MODE))
+        )
+
+
+def reposition(state: Autopilot, ready: Readiness, target: Target, change_mode: int) -> Transition:
+    """Go to a point in GUIDED, which is entered when the sender allows it."""
+    if state.mode is not RoverMode.GUIDED and not change_mode:
+        return Transition(state, Result.DENIED)
+    guided = set_mode(state, RoverMode.GUIDED, ready)
+    return replace(guided, state=accept_target(guided.state, target))
+
+
+def to_local(setpoint: GlobalSetpoint, origin: Origin) -> LocalSetpoint | None:
+    """The same in local NED; None for what can't be meant. Altitudes stay on the ground."""
+    if setpoint.frame not in tuple(GlobalFrame):
+        return None
+    place: Vector | None = None
+    if setpoint.position is not None:
+        point = _ned(setpoint.position[0], setpoint.position[1], origin)
+        if point is None:
+            return None
+        place = (*point, 0.0)
+    s = setpoint
+    head = (s.target_sysid, s.target_compid, s.time_s, Frame.LOCAL_NED, s.type_mask)
+    return LocalSetpoint(*head, place, s.velocity_mps, s.yaw_rad, s.yaw_rate_radps)
 
 
 def to_target(setpoint: LocalSetpoint, estimate: Estimate, now_s: float) -> Target | None:
@@ -51,6 +120,14 @@ def to_target(setpoint: LocalSetpoint, estimate: Estimate, now_s: float) -> Targ
         velocity = _turned(setpoint.velocity_mps, estimate, in_body)
         return Target(now_s, velocity, None, yaw_rad, setpoint.yaw_rate_radps)
     return None
+
+
+def _ned(lat_deg: float, lon_deg: float, origin: Origin) -> tuple[float, float] | None:
+    """North and east (m) of a point on the globe; None far from here, or for what is no number."""
+    if not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
+        return None
+    north, east = wgs84_to_ned(lat_deg, lon_deg, origin)
+    return (north, east) if max(abs(north), abs(east)) <= ABSURD_M else None
 
 
 def _turned(

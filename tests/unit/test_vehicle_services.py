@@ -73,7 +73,7 @@ def test_health_bits_follow_readiness(rescue: Scenario) -> None:
     assert after.health & Sensor.GPS
 
 
-@pytest.mark.parametrize("number", [0, 21, 22, 192, 300, 520, 521, 2000, 31000, 65535])
+@pytest.mark.parametrize("number", [0, 21, 22, 520, 521, 2000, 31000, 65535])
 def test_every_command_gets_exactly_one_ack_for_its_sender(rover: Harness, number: int) -> None:
     for message in (
         CommandLong(2, 1, number, (0.0,) * 7),
@@ -231,5 +231,3 @@ def test_missions_fences_and_rally_points_are_empty(rover: Harness, kind: int) -
     assert answer.value == MissionCount(STATION, 190, 0, kind)
     (answer,) = rover.tell(rover.station.encode(MissionClearAll(2, 1, kind)))
     assert answer.value == MissionAck(STATION, 190, 0, kind)
-    (answer,) = rover.tell(rover.station.encode(MissionCount(2, 1, 5, kind)))
-    assert answer.value == MissionAck(STATION, 190, 3, kind)

@@ -1,0 +1,116 @@
+"""The lists that a station has uploaded, and what AUTO, RTL and the fence make of them."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from hil.frames import Origin, wgs84_to_ned
+from hil.mavlink import (
+    Message,
+    MissionCurrent,
+    MissionItem,
+    MissionItemReached,
+    MissionResult,
+    MissionType,
+    RoverMode,
+    Severity,
+    StatusText,
+)
+from sim_vehicles.autopilot import Target
+from sim_vehicles.fence import Circle, Zone, breached, zones_of
+from sim_vehicles.mission import Point, Progress, Surroundings, advance, state_of
+
+Items = tuple[MissionItem, ...]
+CIRCLE_BIT, ZONES_BIT = 2, 4  # FENCE_TYPE
+
+
+class Navigator:
+    """Mission, fence and rally points of one vehicle."""
+
+    def __init__(self, origin: Origin) -> None:
+        self._origin = origin
+        self._zones: tuple[Zone, ...] = ()
+        self._running = False
+        self.progress = Progress()
+        self.lists: dict[MissionType, Items] = dict.fromkeys(
+            (MissionType.MISSION, MissionType.FENCE, MissionType.RALLY), ()
+        )
+
+    @property
+    def has_mission(self) -> bool:
+        """Whether there is anything after home."""
+        return len(self.lists[MissionType.MISSION]) > 1
+
+    @property
+    def has_zones(self) -> bool:
+        return bool(self._zones)
+
+    def store(self, kind: MissionType, items: Sequence[MissionItem]) -> MissionResult:
+        """Take a whole list over; a mission starts again from its first item."""
+        if kind is MissionType.FENCE:
+            zones = zones_of(items, self._origin)
+            if zones is None:
+                return MissionResult.INVALID
+            self._zones = zones
+        if kind is MissionType.MISSION:
+            self.progress = Progress()
+        self.lists[kind] = tuple(items)
+        return MissionResult.ACCEPTED
+
+    def set_current(self, seq: int) -> bool:
+        """Go on with an item. False when there is none of that number; 0 starts again."""
+        if not 0 <= seq < len(self.lists[MissionType.MISSION]):
+            return False
+        self.progress = Progress(max(1, seq), speed_mps=self.progress.speed_mps)
+        return True
+
+    def current(self) -> MissionCurrent:
+        count = len(self.lists[MissionType.MISSION])
+        seq = min(self.progress.seq, max(0, count - 1))
+        state = state_of(count, self.progress, self._running)
+        return MissionCurrent(seq, max(0, count - 1), state)
+
+    def steer(self, mode: RoverMode, around: Surroundings) -> tuple[Target | None, list[Message]]:
+        """Where AUTO or RTL wants to go now, and what to tell; other modes pause the mission."""
+        resumed = mode is RoverMode.AUTO and not self._running
+        self._running = mode is RoverMode.AUTO
+        if mode is RoverMode.RTL:
+            return Target(around.now_s, position_m=self._way_home(around)), []
+        if mode is not RoverMode.AUTO:
+            return None, []
+        if resumed and self.progress.complete:
+            self.progress = Progress()
+        return self._run(around)
+
+    def _run(self, around: Surroundings) -> tuple[Target, list[Message]]:
+        before = self.progress
+        step = advance(self.lists[MissionType.MISSION], before, around)
+        self.progress = step.progress
+        told: list[Message] = []
+        for seq in step.reached:
+            told += [
+                StatusText(Severity.INFO, f"Reached waypoint #{seq}"),
+                MissionItemReached(seq),
+            ]
+        if self.progress.seq != before.seq:
+            told.append(self.current())
+        if self.progress.complete and not before.complete:
+            told.append(StatusText(Severity.NOTICE, "Mission Complete"))
+        target = Target(around.now_s, speed_mps=self.progress.speed_mps)
+        if step.goal_m is None:
+            return replace(target, velocity_mps=(0.0, 0.0)), told
+        return replace(target, position_m=step.goal_m), told
+
+    def _way_home(self, around: Surroundings) -> Point:
+        """The nearest of home and the rally points."""
+        rally = [
+            wgs84_to_ned(item.x / 1e7, item.y / 1e7, self._origin)
+            for item in self.lists[MissionType.RALLY]
+        ]
+        return min((around.home_m, *rally), key=lambda point: math.dist(point, around.here_m))
+
+    def is_outside(self, here_m: Point, home_m: Point, fence_type: int, radius_m: float) -> bool:
+        """Whether a point breaches the fences that FENCE_TYPE chooses."""
+        zones = self._zones if fence_type & ZONES_BIT else ()
+        circle = (Circle(home_m, radius_m, True),) if fence_type & CIRCLE_BIT else ()
+        return breached((*zones, *circle), here_m)
