@@ -147,6 +147,34 @@ class Sensors(Model):
     level_sigma_rad: Positive = 0.002
 
 
+class Wind(Model):
+    """Where the air goes to, steadily."""
+
+    north_mps: Annotated[float, Field(ge=-50, le=50)] = 0.0
+    east_mps: Annotated[float, Field(ge=-50, le=50)] = 0.0
+
+
+class Slope(Model):
+    """Rise of the ground per metre to the north and to the east."""
+
+    north: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
+    east: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
+
+
+class Patch(Arena):
+    """A rectangle where rolling resistance and grip are multiplied by `friction`."""
+
+    friction: Annotated[float, Field(ge=0, le=20)]
+
+
+class Terrain(Model):
+    """What the world does to everybody. Truth only; where patches overlap, the first counts."""
+
+    wind: Wind = Wind()
+    slope: Slope = Slope()
+    patches: Annotated[tuple[Patch, ...], Field(max_length=100)] = ()
+
+
 class Plant(Model):
     """How far the world may be from the data sheet: one draw per vehicle and seed. Truth only."""
 
@@ -156,15 +184,17 @@ class Plant(Model):
     contact_friction: NonNegative = 0.2
 
 
+_QUANTITIES = "goal_distance_m|north_m|east_m|speed_mps"
+_CONDITION = rf"^[a-z][a-z0-9_]*\.({_QUANTITIES}) *[<>] *-?[0-9.]+$"
+
+
 class Onset(Model):
     """When a fault strikes: at a world time, or when a condition on the truth first holds."""
 
     at_s: NonNegative | None = None
     when: Annotated[
         str | None,
-        Field(
-            pattern=r"^[a-z][a-z0-9_]*\.(goal_distance_m|north_m|east_m|speed_mps) *[<>] *-?[0-9.]+$"
-        ),
+        Field(pattern=_CONDITION),
     ] = None
 
     @model_validator(mode="after")
@@ -303,6 +333,7 @@ class Scenario(Model):
     fleet: Annotated[tuple[Vehicle, ...], Field(min_length=1, max_length=100)]
     sensors: Sensors = Sensors()
     plant: Plant = Plant()
+    terrain: Terrain = Terrain()
     faults: tuple[FaultModel, ...] = ()
     diagnosis: Diagnosis = Diagnosis()
     planning: Planning = Planning()

@@ -181,6 +181,11 @@ def pwm_to_output(pwm_us: int) -> float | None:
     return max(-1.0, min(1.0, (pwm_us - PWM_NEUTRAL_US) / PWM_SPAN_US))
 
 
+def locked_motors(pwm_us: Sequence[int]) -> frozenset[int]:
+    """Places (from 0) of the motors whose wheels are blocked."""
+    return frozenset(i for i, pwm in enumerate(pwm_us) if pwm == PWM_LOCKED_US)
+
+
 def clip_pwm(pwm_us: int) -> int:
     """The nearest PWM that drives: 1100..1900 us."""
     return max(PWM_NEUTRAL_US - PWM_SPAN_US, min(PWM_NEUTRAL_US + PWM_SPAN_US, pwm_us))

@@ -18,7 +18,7 @@ def _omni(name: str, places: Sequence[Pair], directions: Sequence[Pair]) -> Airf
     motors = tuple(
         Motor(p, d, 16.0, 1.6, grip_n=13.7) for p, d in zip(places, directions, strict=True)
     )
-    return Airframe(name, 0.3, 8.0, 0.36, 0.10, 0.6, 1.0, motors)
+    return Airframe(name, 0.3, 8.0, 0.36, 0.10, 0.6, 1.0, motors, drag_area_m2=0.15)
 
 
 # left, right, front, rear: one pair drives x, the other y (ArduPilot FRAME_TYPE 3)

@@ -1,9 +1,7 @@
 """The world: discs on a plane with walls, seen from above, in pymunk.
 
-pymunk's x is north, its y is east and its angle is yaw, so that NED and pymunk agree. Rolling
-resistance is Coulomb friction with the ground, as a joint to it whose force is limited: the
-solver settles it together with the contacts, so it holds what is pushed too weakly and never
-reverses a motion.
+pymunk's x is north, its y is east and its angle is yaw, so that NED and pymunk agree. What flies
+has height and tilt beside the plane (`flight`), and meets the others only at the same height.
 """
 
 import math
@@ -12,11 +10,21 @@ from typing import Any
 
 import pymunk
 
-from hil.airframe import GRAVITY_MPS2, Airframe, motor_forces, pwm_to_output
+from hil.airframe import (
+    GRAVITY_MPS2,
+    Airframe,
+    lift,
+    locked_motors,
+    motor_forces,
+    pwm_to_output,
+)
 from hil.frames import body_to_ned, ned_to_body, wrap_pi
-from hil.physics_link import AT_REST_MPS2, PhysicsState
-from hil.scenario import Arena, Scenario, Vehicle
+from hil.physics_link import AT_REST_MPS2, PhysicsState, Vector3
+from hil.scenario import Arena, Scenario, Terrain, Vehicle
+from hil.world.flight import Air, in_body, load_n, step, thrust_ned
+from hil.world.ground import Ground
 from hil.world.plant import real_airframe
+from hil.world.terrain import drag_n, friction_factor, slope_force_n, wind_force_n
 from hil.world.truth import Contact, TruthRecord, VehicleTruth
 
 SOLVER_ITERATIONS = 30
@@ -25,39 +33,86 @@ WALL_HALF_THICKNESS_M = 0.25
 _VEHICLE, _WALL = 1, 2  # collision types
 
 
-class _Rover:
-    """A body, the airframe it really has, and where its frame began."""
+class _Vehicle:
+    """A body, the airframe it really has, the ground under it, and where its frame began."""
 
-    def __init__(self, vehicle: Vehicle, frame: Airframe, body: pymunk.Body) -> None:
-        self.name, self.frame, self.body = vehicle.name, frame, body
+    def __init__(
+        self, vehicle: Vehicle, frame: Airframe, body: pymunk.Body, ground: Ground
+    ) -> None:
+        self.name, self.frame, self.body, self.ground = vehicle.name, frame, body, ground
+        self.air = Air()
         self.last: PhysicsState | None = None
 
-    def drive(self, pwm_us: Sequence[int]) -> None:
+    @property
+    def velocity_mps(self) -> Vector3:
+        return self.body.velocity.x, self.body.velocity.y, self.air.down_mps
+
+    def drive(self, pwm_us: Sequence[int], terrain: Terrain, dt_s: float) -> None:
+        """Forces for the next step: motors, slope, wind, and what the ground may hold."""
         outputs = [pwm_to_output(pwm) for pwm in pwm_us[: len(self.frame.motors)]]
         outputs += [None] * (len(self.frame.motors) - len(outputs))
+        friction = friction_factor(terrain, *self.body.position) if terrain.patches else 1.0
+        if self.frame.flight is None:
+            self._roll(outputs, terrain)
+            self.ground.hold(friction, locked_motors(pwm_us[: len(outputs)]))
+        else:
+            load_n = self._fly(outputs, terrain, dt_s)
+            self.ground.hold(friction * load_n / self.frame.weight_n, ())
+
+    def _roll(self, outputs: Sequence[float | None], terrain: Terrain) -> None:
         yaw, velocity = self.body.angle, self.body.velocity
         velocity_body = ned_to_body(velocity.x, velocity.y, yaw)
         fx, fy, torque = motor_forces(
             self.frame, outputs, velocity_body, self.body.angular_velocity
         )
-        self.body.force = body_to_ned(fx, fy, yaw)
+        north, east = body_to_ned(fx, fy, yaw)
+        down_n, down_e = slope_force_n(terrain.slope, self.frame.mass_kg)
+        wind_n, wind_e, _ = wind_force_n(self.frame, terrain.wind, self.velocity_mps)
+        self.body.force = north + down_n + wind_n, east + down_e + wind_e
         self.body.torque = torque
 
-    def state(self, time_s: float) -> PhysicsState:
-        (vn, ve), (n, e), yaw = self.body.velocity, self.body.position, self.body.angle
+    def _fly(self, outputs: Sequence[float | None], terrain: Terrain, dt_s: float) -> float:
+        """Returns what the ground carries (N)."""
+        rotors = lift(self.frame, outputs)
+        north, east, down = thrust_ned(self.air, self.body.angle, rotors.thrust_n)
+        drag = drag_n(self.frame, terrain.wind, self.velocity_mps)
+        self.body.force = north + drag[0], east + drag[1]
+        self.body.torque = rotors.yaw_nm
+        carried_n = load_n(self.frame, self.air, down + drag[2])
+        self.air = step(self.frame, self.air, rotors, down + drag[2], dt_s)
+        return carried_n
+
+    def touches(self, other: "_Vehicle") -> bool:
+        """Whether both are somewhere at the same height."""
+        low, high = -self.air.down_m, -self.air.down_m + self.frame.height_m
+        return low <= -other.air.down_m + other.frame.height_m and -other.air.down_m <= high
+
+    def state(self, time_s: float, terrain: Terrain) -> PhysicsState:
+        (n, e), yaw, air = self.body.position, self.body.angle, self.air
+        velocity = self.velocity_mps
         accel = AT_REST_MPS2
         if self.last is not None and time_s > self.last.time_s:
             dt = time_s - self.last.time_s
-            dvn, dve = vn - self.last.velocity_mps[0], ve - self.last.velocity_mps[1]
-            accel = (*ned_to_body(dvn / dt, dve / dt, yaw), -GRAVITY_MPS2)
+            accel = self._specific_force(self.last.velocity_mps, dt, terrain)
         return PhysicsState(
             time_s=time_s,
-            gyro_radps=(0.0, 0.0, self.body.angular_velocity),
+            gyro_radps=(air.roll_rate_radps, air.pitch_rate_radps, self.body.angular_velocity),
             accel_body_mps2=accel,
-            position_m=(n, e, 0.0),
-            velocity_mps=(vn, ve, 0.0),
-            attitude_rad=(0.0, 0.0, wrap_pi(yaw)),
+            position_m=(n, e, air.down_m),
+            velocity_mps=velocity,
+            attitude_rad=(wrap_pi(air.roll_rad), wrap_pi(air.pitch_rad), wrap_pi(yaw)),
         )
+
+    def _specific_force(self, before_mps: Vector3, dt: float, terrain: Terrain) -> Vector3:
+        """What an accelerometer feels (body): acceleration less gravity, mean over the frame."""
+        n, e, d = (
+            (now - then) / dt for now, then in zip(self.velocity_mps, before_mps, strict=True)
+        )
+        if self.frame.flight is not None:
+            return in_body((n, e, d - GRAVITY_MPS2), self.air, self.body.angle)
+        down_n, down_e = slope_force_n(terrain.slope, self.frame.mass_kg)
+        n, e = n - down_n / self.frame.mass_kg, e - down_e / self.frame.mass_kg
+        return (*ned_to_body(n, e, self.body.angle), -GRAVITY_MPS2)
 
 
 class World:
@@ -73,14 +128,18 @@ class World:
         self._friction = math.sqrt(scenario.plant.contact_friction)
         self._contacts: list[Contact] = []
         self._names: dict[pymunk.Shape, str] = {}
+        self._terrain = scenario.terrain
         self._add_walls(scenario.arena)
-        self._rovers = {
-            v.sysid: self._add_rover(
+        self._vehicles = {
+            v.sysid: self._add_vehicle(
                 v, real_airframe(v.frame, scenario.plant, seed, v.sysid), scenario.yaw == "locked"
             )
             for v in scenario.fleet
         }
+        self._by_name = {v.name: v for v in self._vehicles.values()}
         self._space.on_collision(_VEHICLE, _VEHICLE, post_solve=self._touched)
+        if any(v.frame.flight for v in self._vehicles.values()):
+            self._space.on_collision(_VEHICLE, _VEHICLE, pre_solve=self._pass_over)
         self._space.on_collision(_VEHICLE, _WALL, post_solve=self._touched)
 
     @property
@@ -90,21 +149,21 @@ class World:
     def step(self, outputs: Mapping[int, Sequence[int]]) -> None:
         """One physics step under PWM outputs (us) by system id; who is missing has no power."""
         self._contacts.clear()
-        for sysid, rover in self._rovers.items():
-            rover.drive(outputs.get(sysid, ()))
+        for sysid, vehicle in self._vehicles.items():
+            vehicle.drive(outputs.get(sysid, ()), self._terrain, 1.0 / self.physics_hz)
         self.steps += 1
         self._space.step(1.0 / self.physics_hz)
 
     def state(self, sysid: int) -> PhysicsState:
         """The reply that ends a frame; its acceleration is the mean since the previous reply."""
-        rover = self._rovers[sysid]
-        if rover.last is None or rover.last.time_s != self.time_s:
-            rover.last = rover.state(self.time_s)
-        return rover.last
+        vehicle = self._vehicles[sysid]
+        if vehicle.last is None or vehicle.last.time_s != self.time_s:
+            vehicle.last = vehicle.state(self.time_s, self._terrain)
+        return vehicle.last
 
     def truth(self) -> TruthRecord:
         """Where everything is now."""
-        return TruthRecord(self.time_s, {s: _truth(r.body) for s, r in self._rovers.items()})
+        return TruthRecord(self.time_s, {s: _truth(v) for s, v in self._vehicles.items()})
 
     def contacts(self) -> tuple[Contact, ...]:
         """Who touched whom during the last step, walls included."""
@@ -118,24 +177,18 @@ class World:
             point_m = (points[0].point_a.x, points[0].point_a.y)
             self._contacts.append(Contact(self.time_s, (first, second), impulse_ns, point_m))
 
-    def _add_rover(self, vehicle: Vehicle, frame: Airframe, yaw_locked: bool) -> _Rover:
+    def _pass_over(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
+        first, second = (self._by_name[self._names[shape]] for shape in arbiter.shapes)
+        arbiter.process_collision = first.touches(second)
+
+    def _add_vehicle(self, vehicle: Vehicle, frame: Airframe, yaw_locked: bool) -> _Vehicle:
         inertia = math.inf if yaw_locked else frame.yaw_inertia_kgm2
         body = pymunk.Body(frame.mass_kg, inertia)
         body.position = vehicle.start.north_m, vehicle.start.east_m
         body.angle = math.radians(vehicle.start_yaw_deg)
         self._space.add(body)
         self._add_shape(pymunk.Circle(body, frame.radius_m), vehicle.name, _VEHICLE)
-        ground = self._space.static_body
-        joints: list[pymunk.Constraint] = [pymunk.PivotJoint(ground, body, (0, 0), (0, 0))]
-        limits = [frame.rolling_force_n]
-        if not yaw_locked:
-            joints.append(pymunk.GearJoint(ground, body, 0.0, 1.0))
-            limits.append(frame.yaw_resistance_nm)
-        for joint, limit in zip(joints, limits, strict=True):
-            joint.max_force = limit
-            joint.max_bias = 0.0  # resists velocity, never pulls towards a place
-            self._space.add(joint)
-        return _Rover(vehicle, frame, body)
+        return _Vehicle(vehicle, frame, body, Ground(self._space, body, frame, yaw_locked))
 
     def _add_walls(self, arena: Arena) -> None:
         t = WALL_HALF_THICKNESS_M
@@ -158,6 +211,6 @@ class World:
         self._space.add(shape)
 
 
-def _truth(body: pymunk.Body) -> VehicleTruth:
-    (n, e), (vn, ve) = body.position, body.velocity
-    return VehicleTruth(n, e, wrap_pi(body.angle), vn, ve)
+def _truth(vehicle: _Vehicle) -> VehicleTruth:
+    (n, e), (vn, ve), air = vehicle.body.position, vehicle.body.velocity, vehicle.air
+    return VehicleTruth(n, e, wrap_pi(vehicle.body.angle), vn, ve, air.down_m, air.down_mps)

@@ -13,13 +13,15 @@ EPISODE_GAP_S = 0.25  # contacts of one pair closer in time than this are one ep
 
 @dataclass(frozen=True)
 class VehicleTruth:
-    """One body: position (m) and velocity (m/s) in NED, yaw in rad."""
+    """One body: position (m) and velocity (m/s) in NED, yaw in rad. Down is 0 on the ground."""
 
     north_m: float
     east_m: float
     yaw_rad: float
     north_mps: float
     east_mps: float
+    down_m: float = 0.0
+    down_mps: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -87,12 +89,18 @@ class ContactLog:
 
 
 def truth_line(record: TruthRecord) -> str:
-    """A record as JSON; per vehicle north, east, yaw, north speed, east speed."""
-    vehicles = {
-        str(sysid): [round(x, 6) for x in (v.north_m, v.east_m, v.yaw_rad, v.north_mps, v.east_mps)]
-        for sysid, v in record.vehicles.items()
-    }
+    """A record as JSON; per vehicle north, east, yaw, north speed, east speed.
+
+    Off the ground, down and down speed follow.
+    """
+    vehicles = {str(s): [round(x, 6) for x in _numbers(v)] for s, v in record.vehicles.items()}
     return _line({"type": "truth", "time_s": round(record.time_s, 6), "vehicles": vehicles})
+
+
+def _numbers(v: VehicleTruth) -> tuple[float, ...]:
+    plane = (v.north_m, v.east_m, v.yaw_rad, v.north_mps, v.east_mps)
+    flies = v.down_m != 0.0 or v.down_mps != 0.0
+    return (*plane, v.down_m, v.down_mps) if flies else plane
 
 
 def contact_line(episode: ContactEpisode) -> str:

@@ -43,7 +43,7 @@ def run(world: World, seconds: float, outputs: dict[int, list[int]]) -> None:
 
 def launch(world: World, sysid: int, north_mps: float, east_mps: float) -> None:
     """Give a body a velocity, as no motor could."""
-    world._rovers[sysid].body.velocity = north_mps, east_mps
+    world._vehicles[sysid].body.velocity = north_mps, east_mps
 
 
 def kinetic_energy_j(world: World) -> float:
@@ -110,7 +110,7 @@ def test_locked_yaw_holds_and_free_yaw_turns() -> None:
 def test_turning_coasts_down_by_the_yaw_resistance() -> None:
     """From w, a disc turns on by w^2 I / (2 M)."""
     world = World(scenario((0, 0), yaw="free"), 0)
-    world._rovers[1].body.angular_velocity = 1.0
+    world._vehicles[1].body.angular_velocity = 1.0
     run(world, 3.0, {})
     turned = OMNI_PLUS.yaw_inertia_kgm2 / (2 * OMNI_PLUS.yaw_resistance_nm)
     assert world.truth().vehicles[1].yaw_rad == pytest.approx(turned, abs=1 / world.physics_hz)
