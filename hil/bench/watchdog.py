@@ -3,7 +3,7 @@
 from hil.errors import ProcessDiedError
 from hil.world.simulation import TRUTH_HZ
 
-HANG_S = 5.0  # with 3 s to stop and the recording to merge, within 10 s
+HANG_S = 6.0  # with 3 s to stop and the recording to merge, within 10 s
 FIRST_TICK_WITHIN_S = 30.0
 
 
