@@ -454,7 +454,7 @@ class Station:
         return orders
 
     def _unstuck(self, phase: OnMission, time_s: float) -> OnMission:
-        """Where nobody gets anywhere, begin anew, and with the noise that the policy learnt with."""
+        """Nobody gets anywhere: begin anew, with the noise that the policy learnt with."""
         assert self.watch is not None
         places_m = mission.places_m(self.watch)
         if np.abs(places_m - phase.places_m).max() > STALLED_M:

@@ -4,7 +4,7 @@ The same bytes that would go over UDP go through memory. One `tick` is one autop
 vehicle; the station steps at 20 Hz of simulation time. Time is simulation time throughout.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -21,11 +21,14 @@ STATION_HZ = 20
 EPOCH_US = 1_700_000_000_000_000  # telemetry logs of simulated time start here
 
 
+Learn = Callable[[StationView, PlanRequest, Callable[[PlanProgress], None]], PlanReady]
+
+
 class InlinePlanner:
     """Plans at once, delivers after the declared simulation time. Requests travel as JSON, too."""
 
-    def __init__(self, view: StationView) -> None:
-        self._view = view
+    def __init__(self, view: StationView, learn: Learn) -> None:
+        self._view, self._learn = view, learn
         self._ready: list[tuple[float, PlanReady]] = []
         self._progress: list[PlanProgress] = []
         self.time_s = 0.0
@@ -33,7 +36,7 @@ class InlinePlanner:
     def submit(self, request: PlanRequest) -> None:
         received = decode(encode(request))
         assert isinstance(received, PlanRequest)
-        answer = decode(encode(plan(self._view, received, self._progress.append)))
+        answer = decode(encode(self._learn(self._view, received, self._progress.append)))
         assert isinstance(answer, PlanReady)
         self._ready.append((self.time_s + self._view.planning.planning_sim_s, answer))
 
@@ -60,7 +63,11 @@ class Rig:
     """A scenario in memory. `injector_links` are for whoever breaks things."""
 
     def __init__(
-        self, scenario: Scenario, view: StationView, listeners: Sequence[Listener]
+        self,
+        scenario: Scenario,
+        view: StationView,
+        listeners: Sequence[Listener],
+        learn: Learn = plan,
     ) -> None:
         self._scenario = scenario
         self.simulation = Simulation(scenario, scenario.seed)
@@ -72,9 +79,13 @@ class Rig:
             self._seats[v.sysid] = _Seat(Vehicle(scenario, v.sysid), theirs, broken)
             station_links.append(ours)
             self.injector_links.append(breaker)
-        self.planner = InlinePlanner(view)
+        self.planner = InlinePlanner(view, learn)
         self.node = StationNode(view, station_links, self.planner, listeners)
         self._send_frames()
+
+    def vehicle(self, sysid: int) -> Vehicle:
+        """For tests that speak to a vehicle as a third party would."""
+        return self._seats[sysid].vehicle
 
     @property
     def time_s(self) -> float:
