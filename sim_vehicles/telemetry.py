@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from hil.airframe import pwm_to_output
 from hil.frames import Origin, ned_to_wgs84
 from hil.mavlink import (
     AUTOPILOT_ARDUPILOT,
@@ -14,6 +15,9 @@ from hil.mavlink import (
     AutopilotVersion,
     Battery,
     Capability,
+    EkfFlag,
+    EkfStatus,
+    EscTelemetry,
     ExtendedSysState,
     FenceStatus,
     FixType,
@@ -24,15 +28,21 @@ from hil.mavlink import (
     HomePosition,
     LocalPosition,
     MissionCurrent,
+    RawImu,
+    RcChannels,
     RoverMode,
+    ScaledImu,
     Sensor,
     ServoOutputs,
     SysStatus,
+    VfrHud,
 )
 from sim_vehicles.autopilot import Autopilot, system_status
 from sim_vehicles.battery import BatteryState
 from sim_vehicles.estimator import Estimate
-from sim_vehicles.sensors import GpsFix, Vector
+from sim_vehicles.innovation import Innovation
+from sim_vehicles.sensors import GpsFix, Inertial, Vector
+from sim_vehicles.services.piloting import Sticks
 
 ON_GROUND = 1  # MAV_LANDED_STATE_ON_GROUND
 SATELLITES, HDOP = 18, 0.7
@@ -47,6 +57,15 @@ _MODE_FLAGS = {
 _ALWAYS_HEALTHY = (
     Sensor.GYRO | Sensor.ACCEL | Sensor.MAG | Sensor.YAW_POSITION | Sensor.XY_POSITION_CONTROL
 ) | (Sensor.MOTOR_OUTPUTS | Sensor.BATTERY)
+FIELD_GAUSS = (0.215, 0.43)  # horizontal and down, in central Europe
+_EKF_ALWAYS = EkfFlag.ATTITUDE | EkfFlag.VELOCITY_VERT | EkfFlag.POS_VERT_ABS
+_EKF_WITH_GPS = (
+    EkfFlag.VELOCITY_HORIZ
+    | EkfFlag.POS_HORIZ_REL
+    | EkfFlag.POS_HORIZ_ABS
+    | EkfFlag.PRED_POS_HORIZ_REL
+    | EkfFlag.PRED_POS_HORIZ_ABS
+)
 _WHEN_READY = Sensor.AHRS | Sensor.PREARM_CHECK
 
 
@@ -66,6 +85,10 @@ class Snapshot:
     battery: BatteryState
     mission: MissionCurrent
     fence: FenceStatus | None  # None while it is switched off
+    inertial: Inertial | None
+    innovation: Innovation
+    escs: EscTelemetry
+    sticks: Sticks
 
 
 def heartbeat(s: Snapshot) -> Heartbeat:
@@ -152,6 +175,52 @@ def mission_current(s: Snapshot) -> MissionCurrent:
 
 def fence_status(s: Snapshot) -> FenceStatus | None:
     return s.fence
+
+
+def raw_imu(s: Snapshot) -> RawImu | None:
+    return None if s.inertial is None else RawImu(s.now_s, *_inertial(s.inertial))
+
+
+def scaled_imu(s: Snapshot) -> ScaledImu | None:
+    return None if s.inertial is None else ScaledImu(s.now_s, *_inertial(s.inertial))
+
+
+def _inertial(sample: Inertial) -> tuple[Vector, Vector, Vector]:
+    """Specific force, rates and field, in body axes of a level vehicle."""
+    level_gauss, down_gauss = FIELD_GAUSS
+    yaw = sample.compass_rad
+    field = (level_gauss * math.cos(yaw), -level_gauss * math.sin(yaw), down_gauss)
+    return sample.accel_mps2, sample.gyro_radps, field
+
+
+def ekf_status(s: Snapshot) -> EkfStatus:
+    placed = s.ready and s.fix is not None
+    flags = _EKF_ALWAYS | (_EKF_WITH_GPS if placed else EkfFlag.CONST_POS_MODE)
+    return EkfStatus(
+        s.innovation.velocity, s.innovation.position, s.innovation.height, 0.0, int(flags)
+    )
+
+
+def esc_telemetry(s: Snapshot) -> EscTelemetry:
+    return s.escs
+
+
+def vfr_hud(s: Snapshot) -> VfrHud:
+    vn, ve, vd = s.estimate.velocity_mps
+    outputs = [abs(pwm_to_output(pwm) or 0.0) for pwm in s.pwm_us if pwm]
+    throttle = sum(outputs) / max(1, len(outputs))
+    alt_m = s.origin.alt_m - s.estimate.position_m[2]
+    return VfrHud(math.hypot(vn, ve), alt_m, -vd, s.estimate.yaw_rad, throttle)
+
+
+def rc_channels(s: Snapshot) -> RcChannels | None:
+    """The sticks as channels 1 (steering), 3 (throttle), 4 (lateral); None before any moved."""
+    if s.sticks.moved_s == -math.inf:
+        return None
+    steering, throttle, lateral = (
+        round(1500 + 500 * v) for v in (s.sticks.steering, s.sticks.throttle, s.sticks.lateral)
+    )
+    return RcChannels(s.now_s, (steering, 1500, throttle, lateral))
 
 
 def autopilot_version(s: Snapshot) -> AutopilotVersion:

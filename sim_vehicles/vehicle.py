@@ -37,13 +37,15 @@ from sim_vehicles.autopilot import (
 from sim_vehicles.battery import BatteryState, drain
 from sim_vehicles.control import Drive, Memory, drive_at, velocity_towards
 from sim_vehicles.damage import MotorOutputs
+from sim_vehicles.escs import esc_telemetry
 from sim_vehicles.estimator import Estimate, Estimator
 from sim_vehicles.failsafes import Breaches, Signs, trips
+from sim_vehicles.innovation import Innovation, innovation
 from sim_vehicles.mission import Surroundings
 from sim_vehicles.navigator import Navigator
 from sim_vehicles.parameters import rover_parameters
 from sim_vehicles.port import Port
-from sim_vehicles.sensors import Gps, GpsFix, InertialSensors, Vector
+from sim_vehicles.sensors import Gps, GpsFix, Inertial, InertialSensors, Vector
 from sim_vehicles.services import ftp, time
 from sim_vehicles.services.commands import CommandService
 from sim_vehicles.services.failure import FailureService, injection_parameters
@@ -74,11 +76,17 @@ _TELEMETRY: Mapping[MessageId, Callable[[Snapshot], Message | None]] = {
     MessageId.MISSION_CURRENT: telemetry.mission_current,
     MessageId.AUTOPILOT_VERSION: telemetry.autopilot_version,
     MessageId.FENCE_STATUS: telemetry.fence_status,
+    MessageId.RAW_IMU: telemetry.raw_imu,
+    MessageId.SCALED_IMU: telemetry.scaled_imu,
+    MessageId.EKF_STATUS_REPORT: telemetry.ekf_status,
+    MessageId.ESC_TELEMETRY_1_TO_4: telemetry.esc_telemetry,
+    MessageId.VFR_HUD: telemetry.vfr_hud,
+    MessageId.RC_CHANNELS: telemetry.rc_channels,
 }
 
 
 def default_rates_hz(telemetry_hz: float) -> dict[int, float]:
-    """What streams unprompted on the station's port."""
+    """What streams unprompted on the station's port; all else only when asked for."""
     return {
         MessageId.HEARTBEAT: 1.0,
         MessageId.SYS_STATUS: 1.0,
@@ -114,6 +122,9 @@ class Vehicle:
         self._outputs = MotorOutputs(member.frame)
         self._now_s: float | None = None
         self._gcs_heard_s: float | None = None
+        self._noise = scenario.sensors
+        self._sample: Inertial | None = None
+        self._innovation = Innovation()
         self._fix: GpsFix | None = None
         self._home_m: Vector | None = None
         self._pwm = pad_channels(())
@@ -179,10 +190,12 @@ class Vehicle:
 
     def _sense(self, state: PhysicsState, dt_s: float) -> None:
         damage = self._failures.active
-        self._estimator.inertial(self._inertial.sample(state, damage.gyro, damage.accel), dt_s)
+        self._sample = self._inertial.sample(state, damage.gyro, damage.accel)
+        self._estimator.inertial(self._sample, dt_s)
         fix = self._gps.sample(state, damage.gps)
         if fix is not None:
             self._fix = fix
+            self._innovation = innovation(fix, self._estimator.estimate(), self._noise)
             self._estimator.gps(fix)
         elif self._estimator.fix_age_s > FIX_LOST_AFTER_S:
             self._fix = None
@@ -294,9 +307,10 @@ class Vehicle:
         return build(self._snapshot())
 
     def _snapshot(self) -> Snapshot:
+        now_s = self._now_s or 0.0
         return Snapshot(
             sysid=self._sysid,
-            now_s=self._now_s or 0.0,
+            now_s=now_s,
             origin=self._origin,
             estimate=self._estimator.estimate(),
             ready=self._readiness().to_arm,
@@ -307,6 +321,10 @@ class Vehicle:
             battery=self._battery,
             mission=self._navigator.current(),
             fence=self._fence(),
+            inertial=self._sample,
+            innovation=self._innovation,
+            escs=esc_telemetry(self._pwm, self._failures.active.escs, self._battery, now_s),
+            sticks=self._piloting.sticks,
         )
 
     def _fence(self) -> FenceStatus | None:

@@ -22,11 +22,22 @@ EPSILON_S = 1e-6
 
 # MAV_DATA_STREAM to messages, as ArduPilot Rover groups them
 GROUPS: Mapping[int, tuple[MessageId, ...]] = {
-    2: (MessageId.SYS_STATUS, MessageId.GPS_RAW_INT, MessageId.MISSION_CURRENT),
-    3: (MessageId.SERVO_OUTPUT_RAW,),
+    1: (MessageId.RAW_IMU,),
+    2: (
+        MessageId.SYS_STATUS,
+        MessageId.GPS_RAW_INT,
+        MessageId.MISSION_CURRENT,
+        MessageId.FENCE_STATUS,
+    ),
+    3: (MessageId.SERVO_OUTPUT_RAW, MessageId.RC_CHANNELS),
     6: (MessageId.GLOBAL_POSITION_INT, MessageId.LOCAL_POSITION_NED),
     10: (MessageId.ATTITUDE,),
-    12: (MessageId.BATTERY_STATUS,),
+    11: (MessageId.VFR_HUD,),
+    12: (
+        MessageId.BATTERY_STATUS,
+        MessageId.EKF_STATUS_REPORT,
+        MessageId.ESC_TELEMETRY_1_TO_4,
+    ),
 }
 
 

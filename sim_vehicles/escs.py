@@ -1,0 +1,33 @@
+"""What the speed controllers report (pure).
+
+They report the outputs as commanded, so a broken motor is silent here, too; a fault of the
+telemetry itself is what `EscDamage` says.
+"""
+
+from collections.abc import Sequence
+
+from hil.airframe import pwm_to_output
+from hil.mavlink import Esc, EscTelemetry
+from sim_vehicles.battery import MOTOR_A, BatteryState
+from sim_vehicles.damage import EscDamage
+
+FULL_RPM = 3000  # at full output, without load
+REPORTS_HZ = 10.0
+WARM_DEGC = 35
+_ABSENT = Esc(0, 0.0, 0.0, 0, 0, 0)
+
+
+def esc_telemetry(
+    pwm_us: Sequence[int], damage: Sequence[EscDamage], battery: BatteryState, now_s: float
+) -> EscTelemetry:
+    """Of the first four motors. The charge is an equal share of what the battery has given."""
+    share_mah = round(battery.consumed_mah / max(1, len(damage)))
+    escs = []
+    for pwm, broken in zip(pwm_us, damage, strict=False):
+        output = abs(pwm_to_output(pwm) or 0.0)
+        rpm, amps = round(broken.gain * output * FULL_RPM), output * MOTOR_A
+        count = int(now_s * REPORTS_HZ)
+        sound = Esc(rpm, battery.voltage_v, amps, share_mah, WARM_DEGC, count)
+        escs.append(_ABSENT if broken.off else sound)
+    first, second, third, fourth, *_ = [*escs, *(_ABSENT,) * 4]
+    return EscTelemetry((first, second, third, fourth))
