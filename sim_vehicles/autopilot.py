@@ -31,7 +31,8 @@ class Target:
     """Where to drive: at a velocity, or to a point (north, east). One of both is set.
 
     Yaw is a heading in NED (rad), yaw rate in rad/s; None leaves the heading alone. A point may
-    come with a speed not to exceed.
+    come with a speed not to exceed. What flies also climbs at `down_mps`, or goes to the height
+    `down_m` (both NED down).
     """
 
     time_s: float
@@ -40,6 +41,8 @@ class Target:
     yaw_rad: float | None = None
     yaw_rate_radps: float | None = None
     speed_mps: float | None = None
+    down_mps: float = 0.0
+    down_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

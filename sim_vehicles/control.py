@@ -3,7 +3,8 @@
 The velocity loop is feed-forward with a bounded integrator: with a frozen GPS an unbounded one
 would wind up and never unwind. The station's twin copies these equations.
 
-An omni frame follows a velocity set-point sideways without turning; ArduPilot's does not.
+An omni frame follows a velocity set-point sideways without turning; ArduPilot's does not. Other
+ways of steering have files of their own; `steer` picks.
 """
 
 import math
@@ -37,19 +38,37 @@ class Drive:
     @classmethod
     def of(cls, airframe: Airframe, yaw_locked: bool) -> "Drive":
         axes = ("x", "y")
-        first = [airframe.motors[airframe.axis_motors(a)[0] - 1] for a in axes]
-        rolling = [airframe.rolling_force_n / airframe.axis_stall_force_n(a) for a in axes]
-        free = (first[0].free_speed_mps, first[1].free_speed_mps)
-        return cls(airframe, yaw_locked, free, (rolling[0], rolling[1]))
+        free = [_free_speed(airframe, a) for a in axes]
+        rolling = [
+            airframe.rolling_force_n / (airframe.axis_stall_force_n(a) or math.inf) for a in axes
+        ]
+        return cls(airframe, yaw_locked, (free[0], free[1]), (rolling[0], rolling[1]))
 
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """What the controller remembers: an integrator per body axis and the heading to hold (rad)."""
+    """What the controller remembers: an integrator per axis and the heading to hold (rad).
+
+    What flies integrates in NED (m/s2), holds the height `down_m` while it is not told to climb,
+    and turns its rotors up only when `airborne`.
+    """
 
     x: float = 0.0
     y: float = 0.0
     yaw_rad: float = 0.0
+    z: float = 0.0
+    down_m: float | None = None
+    airborne: bool = False
+    resting_s: float = 0.0
+
+    def afresh(self, yaw_rad: float) -> "Memory":
+        """After a change of mode: all forgotten, but for being in the air."""
+        return Memory(yaw_rad=yaw_rad, airborne=self.airborne)
+
+
+def _free_speed(airframe: Airframe, axis: str) -> float:
+    driven = airframe.axis_motors(axis)
+    return airframe.motors[driven[0] - 1].free_speed_mps if driven else math.inf
 
 
 def clip(value: float, limit: float) -> float:

@@ -140,7 +140,8 @@ def local_position(s: Snapshot) -> LocalPosition | None:
 
 
 def attitude(s: Snapshot) -> Attitude:
-    return Attitude(s.now_s, 0.0, 0.0, s.estimate.yaw_rad, *s.estimate.gyro_radps)
+    e = s.estimate
+    return Attitude(s.now_s, e.roll_rad, e.pitch_rad, e.yaw_rad, *e.gyro_radps)
 
 
 def servo_outputs(s: Snapshot) -> ServoOutputs:

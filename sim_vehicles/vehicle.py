@@ -35,10 +35,11 @@ from sim_vehicles.autopilot import (
     check_target,
 )
 from sim_vehicles.battery import BatteryState, drain
-from sim_vehicles.control import Drive, Memory, drive_at, velocity_towards
+from sim_vehicles.control import Drive, Memory, velocity_towards
 from sim_vehicles.damage import MotorOutputs
 from sim_vehicles.escs import esc_telemetry
 from sim_vehicles.estimator import Estimate, Estimator
+from sim_vehicles.flying import climb_to
 from sim_vehicles.failsafes import Breaches, Signs, trips
 from sim_vehicles.innovation import Innovation, innovation
 from sim_vehicles.mission import Surroundings
@@ -57,6 +58,7 @@ from sim_vehicles.services.piloting import PilotingService
 from sim_vehicles.services.service import Replies, Request, merged
 from sim_vehicles.services.setpoints import SetpointService
 from sim_vehicles.services.streams import Builder, StreamService
+from sim_vehicles.steering import steer
 from sim_vehicles.telemetry import Snapshot
 
 PortName = Literal["gcs", "injector"]
@@ -245,7 +247,7 @@ class Vehicle:
         """PWM as commanded, 16 channels."""
         estimate = self._estimator.estimate()
         if not self._autopilot.drives:
-            self._memory = Memory(yaw_rad=estimate.yaw_rad)
+            self._memory = self._memory.afresh(estimate.yaw_rad)
             self._battery = drain(self._battery, (), dt_s)
             return pad_channels([output_to_pwm(None)] * len(self._drive.airframe.motors))
         if self._autopilot.mode is RoverMode.MANUAL:
@@ -254,24 +256,28 @@ class Vehicle:
             outputs = mix(airframe, sticks.throttle, sticks.lateral, sticks.steering)
         else:
             velocity = self._aim(estimate, dt_s)
-            outputs, self._memory = drive_at(self._drive, self._memory, estimate, velocity, dt_s)
+            outputs, self._memory = steer(self._drive, self._memory, estimate, velocity, dt_s)
         self._battery = drain(self._battery, outputs, dt_s)
         return pad_channels([output_to_pwm(output) for output in outputs])
 
-    def _aim(self, estimate: Estimate, dt_s: float) -> tuple[float, float]:
+    def _aim(self, estimate: Estimate, dt_s: float) -> Vector:
         """The velocity that the target asks for now; turns the heading to hold towards it."""
         target = self._autopilot.target
         if target is None:
-            return 0.0, 0.0
+            return 0.0, 0.0, 0.0
         if target.yaw_rad is not None:
             self._memory = replace(self._memory, yaw_rad=target.yaw_rad)
         elif target.yaw_rate_radps is not None:
             yaw_rad = wrap_pi(self._memory.yaw_rad + target.yaw_rate_radps * dt_s)
             self._memory = replace(self._memory, yaw_rad=yaw_rad)
+        down_mps = target.down_mps
+        if target.down_m is not None:
+            down_mps = climb_to(self._drive.airframe, estimate, target.down_m)
         if target.position_m is not None:
             limit_mps = min(self._parameters["WP_SPEED"], target.speed_mps or math.inf)
-            return velocity_towards(target.position_m, estimate, limit_mps)
-        return target.velocity_mps or (0.0, 0.0)
+            to = velocity_towards(target.position_m, estimate, limit_mps)
+            return (*to, down_mps)
+        return (*(target.velocity_mps or (0.0, 0.0)), down_mps)
 
     def _broken(self, pwm_us: tuple[int, ...]) -> tuple[int, ...]:
         """What the motors get: after reporting, so that a motor fault is silent."""
@@ -281,7 +287,7 @@ class Vehicle:
         transition: Transition = change(self._autopilot, self._readiness())
         before, self._autopilot = self._autopilot, transition.state
         if (before.mode, before.armed) != (self._autopilot.mode, self._autopilot.armed):
-            self._memory = Memory(yaw_rad=self._estimator.estimate().yaw_rad)
+            self._memory = self._memory.afresh(self._estimator.estimate().yaw_rad)
             self._piloting.centre()
         self._tell(transition.texts)
         return transition.result

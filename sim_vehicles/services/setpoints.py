@@ -103,7 +103,7 @@ def to_local(setpoint: GlobalSetpoint, origin: Origin) -> LocalSetpoint | None:
 def to_target(setpoint: LocalSetpoint, estimate: Estimate, now_s: float) -> Target | None:
     """The target of a set-point in any of the four local frames; None for what can't be meant.
 
-    As in ArduPilot Rover a position excludes a velocity, and vertical fields are ignored.
+    As in ArduPilot Rover a position excludes a velocity. Vertical fields are for what flies.
     """
     if setpoint.frame not in tuple(Frame) or _absurd(setpoint):
         return None
@@ -115,10 +115,15 @@ def to_target(setpoint: LocalSetpoint, estimate: Estimate, now_s: float) -> Targ
         north, east = _turned(setpoint.position_m, estimate, in_body)
         if setpoint.frame != Frame.LOCAL_NED:
             north, east = north + estimate.position_m[0], east + estimate.position_m[1]
-        return Target(now_s, None, (north, east), yaw_rad, setpoint.yaw_rate_radps)
+        down = setpoint.position_m[2]
+        if setpoint.frame not in (Frame.LOCAL_NED, Frame.BODY_NED):
+            down += estimate.position_m[2]
+        point = (north, east)
+        return Target(now_s, None, point, yaw_rad, setpoint.yaw_rate_radps, down_m=down)
     if setpoint.velocity_mps is not None:
         velocity = _turned(setpoint.velocity_mps, estimate, in_body)
-        return Target(now_s, velocity, None, yaw_rad, setpoint.yaw_rate_radps)
+        down = setpoint.velocity_mps[2]
+        return Target(now_s, velocity, None, yaw_rad, setpoint.yaw_rate_radps, down_mps=down)
     return None
 
 
