@@ -1,12 +1,10 @@
 """Child processes: started, listened to, watched, and stopped without leaving an orphan."""
 
-import ctypes
 import json
 import os
 import selectors
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
@@ -14,10 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hil.errors import HilError, ProcessDiedError
+from hil.lifeline import dying_with_parent
 
 STOP_WITHIN_S = 3.0
-_PR_SET_PDEATHSIG = 1
-_PARENT_GONE = 1
 
 
 @dataclass(frozen=True)
@@ -48,7 +45,7 @@ class Child:
                 stderr=log,
                 bufsize=0,
                 start_new_session=True,
-                preexec_fn=_dying_with_parent(),
+                preexec_fn=dying_with_parent(),
             )
         assert self.process.stdout is not None
         self.stdout = self.process.stdout
@@ -94,24 +91,6 @@ class Child:
         if self.process.stdin is not None:
             with suppress(BrokenPipeError):
                 self.process.stdin.close()
-
-
-def _dying_with_parent() -> Callable[[], None] | None:
-    """What the child does before it runs: ask the kernel for SIGKILL when this process is gone.
-
-    Only Linux has that; elsewhere a SIGKILLed bench leaves children that stop by themselves
-    when their links fall silent.
-    """
-    if sys.platform != "linux":
-        return None
-    prctl, parent = ctypes.CDLL(None).prctl, os.getpid()
-
-    def ask() -> None:
-        prctl(_PR_SET_PDEATHSIG, int(signal.SIGKILL))
-        if os.getppid() != parent:
-            os._exit(_PARENT_GONE)
-
-    return ask
 
 
 class Children:
