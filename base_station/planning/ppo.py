@@ -73,18 +73,18 @@ TUNED_ALPHA = Preset(
 )
 TUNED_BETA = Preset(
     environments=64,
-    steps=64,
+    steps=32,
     batch_size=512,
     epochs=8,
-    learning_rate=5e-4,
+    learning_rate=1e-3,
     gamma=0.99,
     gae_lambda=0.95,
     entropy=0.0,
     value_weight=0.5,
     value_clip=None,
     initial_log_std=-0.5,
-    total_timesteps=250_000,
-    check_every=3,
+    total_timesteps=180_000,
+    check_every=4,
 )
 
 
