@@ -24,7 +24,7 @@ TURNING_MPS = 0.1  # slower set-points don't turn it
 HEADING_GAIN = 2.0  # rad/s per rad
 RATE_LIMIT_RADPS = 1.5
 RATE_GAIN = 0.3  # output per rad/s
-SCRUB_RATE_RADPS = 0.2  # set-point from which on scrub is fully fed forward
+SCRUB_RATE_RADPS = 0.05  # set-point from which on scrub is fully fed forward
 
 
 def skid_at(

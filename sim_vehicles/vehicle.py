@@ -39,8 +39,8 @@ from sim_vehicles.control import Drive, Memory, velocity_towards
 from sim_vehicles.damage import MotorOutputs
 from sim_vehicles.escs import esc_telemetry
 from sim_vehicles.estimator import Estimate, Estimator
-from sim_vehicles.flying import climb_to
 from sim_vehicles.failsafes import Breaches, Signs, trips
+from sim_vehicles.flying import climb_to
 from sim_vehicles.innovation import Innovation, innovation
 from sim_vehicles.mission import Surroundings
 from sim_vehicles.navigator import Navigator

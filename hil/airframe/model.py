@@ -139,7 +139,7 @@ class Airframe:
 def mix(airframe: Airframe, x: float, y: float, yaw: float) -> tuple[float, ...]:
     """Motor outputs for body commands in [-1, 1]; scaled down together when one would saturate."""
     raw = [
-        m.direction[0] * x + m.direction[1] * y + math.copysign(yaw, m.arm_m)
+        m.direction[0] * x + m.direction[1] * y + yaw * math.copysign(1.0, m.arm_m)
         for m in airframe.motors
     ]
     scale = max(1.0, *(abs(u) for u in raw))

@@ -66,6 +66,13 @@ def test_yaw_law_and_its_limit() -> None:
     assert max(map(abs, outputs)) == 0.5
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_it_turns_either_way(side: float) -> None:
+    outputs, _ = drive_at(DRIVE, Memory(yaw_rad=0.1 * side), STILL, (0.0, 0.0), DT_S)
+    arms = [m.arm_m for m in OMNI_PLUS.motors]
+    assert all(u * arm * side > 0.0 for u, arm in zip(outputs, arms, strict=True))
+
+
 def test_yaw_takes_the_short_way() -> None:
     outputs, _ = drive_at(
         DRIVE, Memory(yaw_rad=-3.1), replace(STILL, yaw_rad=3.1), (0.0, 0.0), DT_S
