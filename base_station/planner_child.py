@@ -8,6 +8,7 @@ from typing import IO
 
 from base_station.planning.requests import PlanProgress, PlanReady, PlanRequest, decode, encode
 from hil.errors import ProcessDiedError
+from hil.lifeline import dying_with_parent
 
 STOP_S = 3.0
 
@@ -25,6 +26,7 @@ class PlannerChild:
                 stdout=subprocess.PIPE,
                 stderr=log,
                 env=environment,
+                preexec_fn=dying_with_parent(),
             )
         assert self._child.stdin is not None
         assert self._child.stdout is not None

@@ -12,6 +12,9 @@ from base_station.twin.state import EAST, HELD_EAST, HELD_NORTH, NORTH
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+# the kernel is compiled for one kind of arrays; a read-only one would compile it again, for seconds
+WRITABLE = ("C", "W")
+
 
 @dataclass(frozen=True, eq=False)
 class Advanced:
@@ -80,8 +83,8 @@ def advance_in_place(
         parameters,
         faults,
         states,
-        np.ascontiguousarray(setpoints),
-        np.ascontiguousarray(driven),
+        np.require(setpoints, requirements=WRITABLE),
+        np.require(driven, requirements=WRITABLE),
         steps,
         impulses_ns,
         walls,

@@ -78,21 +78,23 @@ def test_a_coasting_rover_stops_where_rolling_resistance_stops_it():
     assert after[V_NORTH] == 0.0
 
 
-def test_one_step_of_driving_is_what_the_airframe_says():
+@pytest.mark.parametrize("turn_rad", [0.2, -0.2])
+def test_one_step_of_driving_is_what_the_airframe_says(turn_rad):
     model, state = lone("free"), at_rest()
-    state[0, 0, [V_NORTH, V_EAST, YAW_RATE, SP_YAW]] = 0.3, -0.2, 0.1, 0.2
+    state[0, 0, [V_NORTH, V_EAST, YAW_RATE, SP_YAW]] = 0.3, -0.2, 0.1, turn_rad
     state[0, 0, DRIVEN] = 1.0
-    after = run(model, HEALTHY, state, [0.5, 0.1, 0.2], DRIVE, model.dt_s)[0, 0]
+    after = run(model, HEALTHY, state, [0.5, 0.1, turn_rad], DRIVE, model.dt_s)[0, 0]
     stall = OMNI_PLUS.axis_stall_force_n("x")
     rolling = OMNI_PLUS.rolling_force_n
     u = [0.5 / 1.6 + rolling / stall + after[I_X], 0.1 / 1.6 + rolling / stall + after[I_Y]]
-    outputs = mix(OMNI_PLUS, *u, 2.0 * 0.2 - 0.5 * 0.1)
+    outputs = mix(OMNI_PLUS, *u, 2.0 * turn_rad - 0.5 * 0.1)
     fx, fy, torque = motor_forces(OMNI_PLUS, outputs, (0.3, -0.2), 0.1)
     v = np.array([0.3, -0.2]) + np.array([fx, fy]) / OMNI_PLUS.mass_kg * model.dt_s
     v *= 1.0 - OMNI_PLUS.rolling_resistance * GRAVITY_MPS2 * model.dt_s / np.linalg.norm(v)
     assert after[[V_NORTH, V_EAST]] == pytest.approx(v, abs=1e-12)
     rate = 0.1 + torque / OMNI_PLUS.yaw_inertia_kgm2 * model.dt_s
-    rate -= OMNI_PLUS.yaw_resistance_nm / OMNI_PLUS.yaw_inertia_kgm2 * model.dt_s
+    drag = OMNI_PLUS.yaw_resistance_nm / OMNI_PLUS.yaw_inertia_kgm2 * model.dt_s
+    rate -= math.copysign(min(drag, abs(rate)), rate)
     assert after[YAW_RATE] == pytest.approx(rate, abs=1e-12)
 
 

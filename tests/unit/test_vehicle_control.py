@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from hil.airframe import OMNI_PLUS
+from hil.airframe import OMNI_PLUS, mix, motor_forces
 from sim_vehicles.control import Drive, Memory, drive_at, feed_forward, velocity_towards
 from sim_vehicles.estimator import Estimate
 
@@ -89,3 +89,10 @@ def test_a_locked_heading_is_not_steered() -> None:
 def test_a_position_is_approached_in_proportion_and_within_the_limit() -> None:
     assert velocity_towards((0.5, -0.25), STILL, 1.0) == pytest.approx((0.4, -0.2))
     assert velocity_towards((30.0, 40.0), STILL, 1.0) == pytest.approx((0.6, 0.8))
+
+
+@pytest.mark.parametrize("yaw", [-0.4, 0.4])
+def test_a_yaw_command_turns_the_way_it_says(yaw: float) -> None:
+    outputs = mix(OMNI_PLUS, 0.0, 0.0, yaw)
+    _, _, torque_nm = motor_forces(OMNI_PLUS, outputs, (0.0, 0.0), 0.0)
+    assert torque_nm * yaw > 0.0
