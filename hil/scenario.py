@@ -120,6 +120,24 @@ class Clock(Model):
         return self
 
 
+Share = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)]
+Seconds = Annotated[float, Field(ge=0, le=60)]
+
+
+class Radio(Model):
+    """What a MAVLink link does to datagrams, in each direction. Truth only.
+
+    `jitter_s` adds up to so much to the delay and keeps the order; `reordering` and `duplication`
+    are shares of datagrams that come, or come again, 0.2 s late.
+    """
+
+    loss: Share = 0.0
+    delay_s: Seconds = 0.0
+    jitter_s: Seconds = 0.0
+    duplication: Share = 0.0
+    reordering: Share = 0.0
+
+
 class Vehicle(Model):
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
     sysid: SysId
@@ -127,6 +145,7 @@ class Vehicle(Model):
     start: Point
     start_yaw_deg: Finite = 0.0
     goal: Point
+    radio: Radio | None = None  # None: the scenario's
 
     @property
     def frame(self) -> Airframe:
@@ -334,6 +353,7 @@ class Scenario(Model):
     sensors: Sensors = Sensors()
     plant: Plant = Plant()
     terrain: Terrain = Terrain()
+    radio: Radio = Radio()
     faults: tuple[FaultModel, ...] = ()
     diagnosis: Diagnosis = Diagnosis()
     planning: Planning = Planning()
@@ -358,6 +378,10 @@ class Scenario(Model):
                         f"fleet.{i}.{field} of {v.name} is outside the arena less the vehicle's "
                         f"radius of {v.frame.radius_m} m; move it inside"
                     )
+            if self.yaw == "locked" and not v.frame.axis_motors("y") and not v.frame.flight:
+                raise ValueError(
+                    f"{v.name} is a {v.airframe}, which must turn to go sideways; yaw: free lets it"
+                )
         for a, b in _pairs(self.fleet):
             gap = math.dist((a.start.north_m, a.start.east_m), (b.start.north_m, b.start.east_m))
             if gap < a.frame.radius_m + b.frame.radius_m:

@@ -13,7 +13,8 @@ from pathlib import Path
 from types import FrameType
 
 from hil.errors import HilError, InputError
-from hil.link import INJECTOR_PORT_BASE, MAVLINK_PORT_BASE, PHYSICS_PORT_BASE, UdpLink
+from hil.impairment import impaired
+from hil.link import INJECTOR_PORT_BASE, MAVLINK_PORT_BASE, PHYSICS_PORT_BASE, Link, UdpLink
 from hil.physics_link import PhysicsState
 from hil.scenario import Scenario, load_scenario
 from sim_vehicles.physics_end import PhysicsEnd
@@ -144,7 +145,9 @@ class Shell:
     ) -> None:
         self._vehicle, self._physics = vehicle, physics
         self._end = PhysicsEnd(scenario.clock.autopilot_hz)
-        self._mavlink: dict[PortName, UdpLink] = {"gcs": gcs, "injector": injector}
+        self._sources = (physics, gcs, injector)
+        radio = impaired(gcs, scenario, vehicle.sysid, lambda: vehicle.time_s)
+        self._mavlink: dict[PortName, Link] = {"gcs": radio, "injector": injector}
 
     def serve(self) -> None:
         """Frame after frame, for ever."""
@@ -155,14 +158,13 @@ class Shell:
 
     def _exchange(self, frame: bytes) -> PhysicsState:
         """Send a frame and wait for its reply, repeating the frame each second."""
-        sources = [self._physics, *self._mavlink.values()]
         repeat_s = 0.0
         while True:
             now_s = time.monotonic()
             if now_s >= repeat_s:
                 self._physics.send(frame)
                 repeat_s = now_s + REPEAT_AFTER_S
-            select.select(sources, [], [], repeat_s - now_s)
+            select.select(self._sources, [], [], repeat_s - now_s)
             self._receive_mavlink()
             state = self._end.accept(self._physics.receive())
             if state is not None:

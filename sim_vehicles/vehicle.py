@@ -163,6 +163,15 @@ class Vehicle:
         self._ports = {"gcs": Port(self._sysid, gcs), "injector": Port(self._sysid, injector)}
         self._streams = (("gcs", streams), ("injector", beats))
 
+    @property
+    def sysid(self) -> int:
+        return self._sysid
+
+    @property
+    def time_s(self) -> float:
+        """Physics time of the last step."""
+        return self._now_s or 0.0
+
     def receive(self, port: PortName, datagram: bytes) -> None:
         """Handle a datagram now. Bad frames and frames for others change nothing."""
         self._ports[port].receive(datagram, self._now_s or 0.0)

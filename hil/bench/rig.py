@@ -11,7 +11,8 @@ from typing import Literal
 from base_station.node import Listener, StationNode
 from base_station.planning.planner import plan
 from base_station.planning.requests import PlanProgress, PlanReady, PlanRequest, decode, encode
-from hil.link import MemoryLink
+from hil.impairment import impaired
+from hil.link import Link, MemoryLink
 from hil.physics_link import ServoFrame, decode_state, encode_frame
 from hil.scenario import Scenario, StationView
 from hil.world.simulation import Advance, Simulation
@@ -53,8 +54,8 @@ class _Seat:
     """A vehicle and its ends of the two links."""
 
     vehicle: Vehicle
-    gcs: MemoryLink
-    injector: MemoryLink
+    gcs: Link
+    injector: Link
     frames: int = 0
     outputs: tuple[int, ...] = (0,) * 16
 
@@ -76,7 +77,8 @@ class Rig:
         for v in scenario.fleet:
             ours, theirs = MemoryLink.pair()
             breaker, broken = MemoryLink.pair()
-            self._seats[v.sysid] = _Seat(Vehicle(scenario, v.sysid), theirs, broken)
+            radio = impaired(theirs, scenario, v.sysid, lambda: self.time_s)
+            self._seats[v.sysid] = _Seat(Vehicle(scenario, v.sysid), radio, broken)
             station_links.append(ours)
             self.injector_links.append(breaker)
         self.planner = InlinePlanner(view, learn)
