@@ -96,11 +96,11 @@ class _Vehicle:
             accel = self._specific_force(self.last.velocity_mps, dt, terrain)
         return PhysicsState(
             time_s=time_s,
-            gyro_radps=(air.roll_rate_radps, air.pitch_rate_radps, self.body.angular_velocity),
+            gyro_radps=(*air.rates_radps, self.body.angular_velocity),
             accel_body_mps2=accel,
             position_m=(n, e, air.down_m),
             velocity_mps=velocity,
-            attitude_rad=(wrap_pi(air.roll_rad), wrap_pi(air.pitch_rad), wrap_pi(yaw)),
+            attitude_rad=(air.roll_rad, air.pitch_rad, wrap_pi(yaw)),
         )
 
     def _specific_force(self, before_mps: Vector3, dt: float, terrain: Terrain) -> Vector3:
