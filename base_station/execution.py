@@ -12,6 +12,7 @@ from hil.scenario import StationView
 
 Array = NDArray[np.float64]
 
+REST_S = 1.5  # a rover at the speed limit coasts to rest in 1 s
 SETTLE_S = 0.8  # a pulse coasts out within 0.4 s; the rest averages noise
 SPACING_M = 0.35  # gap below which a rover on its way back bends around another
 

@@ -83,7 +83,7 @@ class StationNode:
                 listener.snapshot(snapshot)
         if out.request is not None:
             self._planner.submit(out.request)
-        self._phases.at(self.station.phase.name, wall_s, self.station.time_s)
+        self._phases.at(self.station.desk.phase.name, wall_s, self.station.desk.time_s)
         self._finish()
 
     def _answers(self) -> list[PlanReady]:
@@ -100,13 +100,13 @@ class StationNode:
         return answers
 
     def _finish(self) -> None:
-        if not self.station.ended or self.finished:
+        if not self.station.desk.ended or self.finished:
             return
         if self._ended_s is None:
-            self._ended_s = self.station.time_s
-        if self.station.time_s - self._ended_s >= LINGER_S:
+            self._ended_s = self.station.desk.time_s
+        if self.station.desk.time_s - self._ended_s >= LINGER_S:
             self.finished = True
-            told = outcome(self.station, self._phases, self._trainings)
+            told = outcome(self.station.desk, self._phases, self._trainings)
             for listener in self._listeners:
                 listener.result(told)
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from base_station.desk import Desk
 from base_station.mission import DRIFT_FRACTION
 from base_station.planning.requests import PlanReady
-from base_station.station import Station
 from hil.faults import Unit
 
 UNCERTAIN_SIGMA_M = 0.05  # two of these are all that 0.3 m of true distance leaves over 0.2 m
@@ -49,13 +49,11 @@ def training(answer: PlanReady) -> dict[str, Any]:
     }
 
 
-def outcome(
-    station: Station, phases: PhaseTimes, trainings: list[dict[str, Any]]
-) -> Mapping[str, Any]:
+def outcome(desk: Desk, phases: PhaseTimes, trainings: list[dict[str, Any]]) -> Mapping[str, Any]:
     """The station's own account, plain JSON values only."""
-    verdict = station.verdict
+    verdict = desk.verdict
     return {
-        "alarm": station.alarm,
+        "alarm": desk.alarm,
         "verdict": verdict
         and {
             "sysid": verdict.sysid,
@@ -63,32 +61,30 @@ def outcome(
             "posterior": verdict.posterior,
             "decided": verdict.decided,
         },
-        "ended": getattr(station.phase, "reason", station.phase.name),
-        "goals": {str(m.sysid): _goal(station, v) for v, m in enumerate(station.view.fleet)},
+        "ended": getattr(desk.phase, "reason", desk.phase.name),
+        "goals": {str(m.sysid): _goal(desk, v) for v, m in enumerate(desk.view.fleet)},
         "phases": phases.told(),
         "trainings": trainings,
     }
 
 
-def _goal(station: Station, v: int) -> dict[str, Any]:
-    time_s = station.goals.times_s[v]
+def _goal(desk: Desk, v: int) -> dict[str, Any]:
+    time_s = desk.goals.times_s[v]
     return {
-        "declared": _declared(station, v),
+        "declared": _declared(desk, v),
         "time_s": None if np.isnan(time_s) else round(time_s, 3),
     }
 
 
-def _declared(station: Station, v: int) -> str:
-    watch = station.watch
-    if watch is None or not station.goals.there(watch.state)[v]:
+def _declared(desk: Desk, v: int) -> str:
+    if not desk.watching or not desk.goals.there(desk.watch.state)[v]:
         return "unreached"
-    return "uncertain" if _drift_sigma_m(station, v) > UNCERTAIN_SIGMA_M else "reached"
+    return "uncertain" if _drift_sigma_m(desk, v) > UNCERTAIN_SIGMA_M else "reached"
 
 
-def _drift_sigma_m(station: Station, v: int) -> float:
+def _drift_sigma_m(desk: Desk, v: int) -> float:
     """How far off a position may be that was reckoned without one of its GPS axes."""
-    watch = station.watch
-    assert watch is not None
+    watch = desk.watch
     stuck = any(
         h.fault and h.fault.unit is Unit.GPS and watch.baseline.model.index(h.sysid) == v
         for h in watch.baseline.known

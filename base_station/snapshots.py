@@ -1,41 +1,33 @@
 """The station's belief at one tick, for listeners (pure)."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from base_station import twin
+from base_station.desk import Desk
 from base_station.phases import Concluding, Experimenting, OnMission, Probing, Returning
 from base_station.records import Snapshot, TwinSnapshot, VehicleSnapshot
 from base_station.telemetry import Frame
 
-if TYPE_CHECKING:
-    from base_station.station import Station
-
 Array = NDArray[np.float64]
 
 
-def snapshot(station: Station, frame: Frame) -> Snapshot:
+def snapshot(desk: Desk, frame: Frame) -> Snapshot:
     """Everything the station knows and believes at `frame`."""
-    watch = station.watch
-    assert watch is not None
-    vehicles = tuple(_vehicle(station, frame, v) for v in range(len(station.view.fleet)))
-    return Snapshot(frame.time_s, station.phase.name, watch.threshold, vehicles, _twins(station))
+    watch = desk.watch
+    vehicles = tuple(_vehicle(desk, frame, v) for v in range(len(desk.view.fleet)))
+    return Snapshot(frame.time_s, desk.phase.name, watch.threshold, vehicles, _twins(desk))
 
 
-def _vehicle(station: Station, frame: Frame, v: int) -> VehicleSnapshot:
-    watch, member = station.watch, station.view.fleet[v]
-    assert watch is not None
-    status, orders = station.fleet.tracks[v].status, station.orders
+def _vehicle(desk: Desk, frame: Frame, v: int) -> VehicleSnapshot:
+    watch, member = desk.watch, desk.view.fleet[v]
+    status, orders = desk.fleet.tracks[v].status, desk.orders
     north, east = (float(x) for x in frame.position_m[v])
     setpoint = (float(orders.setpoints[v, 0]), float(orders.setpoints[v, 1]))
     return VehicleSnapshot(
         sysid=member.sysid,
         name=member.name,
-        phase=_vehicle_phase(station, v),
+        phase=_vehicle_phase(desk, v),
         reported_m=(north, east),
         velocity_mps=(float(frame.velocity_mps[v, 0]), float(frame.velocity_mps[v, 1])),
         yaw_rad=float(frame.yaw_rad[v]),
@@ -48,11 +40,11 @@ def _vehicle(station: Station, frame: Frame, v: int) -> VehicleSnapshot:
     )
 
 
-def _vehicle_phase(station: Station, v: int) -> str:
-    driven, delivered = bool(station.orders.driven[v]), station.goals.delivered[v]
-    if station.doubt is not None and station.doubt.suspect == v:
+def _vehicle_phase(desk: Desk, v: int) -> str:
+    driven, delivered = bool(desk.orders.driven[v]), desk.goals.delivered[v]
+    if desk.doubt is not None and desk.doubt.suspect == v:
         return "suspect"
-    match station.phase:
+    match desk.phase:
         case Probing():
             return "probing" if driven else "idle"
         case Experimenting() | Concluding():
@@ -65,9 +57,8 @@ def _vehicle_phase(station: Station, v: int) -> str:
             return "home" if delivered else "idle"
 
 
-def _twins(station: Station) -> tuple[TwinSnapshot, ...]:
-    watch, doubt = station.watch, station.doubt
-    assert watch is not None
+def _twins(desk: Desk) -> tuple[TwinSnapshot, ...]:
+    watch, doubt = desk.watch, desk.doubt
     if doubt is None:
         known = watch.baseline.known
         name = known[-1].name if known else "none"

@@ -14,6 +14,7 @@ from base_station.hypotheses import Hypothesis
 from hil.faults import Fault, Type, Unit
 
 Array = NDArray[np.float64]
+Kind = Literal["alpha", "beta"]
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class PlanRequest:
     """
 
     number: int
-    kind: Literal["alpha", "beta"]
+    kind: Kind
     seed: int
     preset: str
     hypotheses: tuple[Hypothesis, ...]
@@ -40,7 +41,7 @@ class PlanProgress:
     """How a training is getting on; `attempt` counts restarts from 0."""
 
     number: int
-    kind: Literal["alpha", "beta"]
+    kind: Kind
     attempt: int
     timesteps: int
     total_timesteps: int
@@ -89,7 +90,7 @@ class PlanReady:
     """The answer to a PlanRequest. Both plans are None when every restart missed its target."""
 
     number: int
-    kind: Literal["alpha", "beta"]
+    kind: Kind
     trainings: tuple[Training, ...]
     plan: OpenLoopPlan | None = None
     policy: PolicyWeights | None = None

@@ -1,6 +1,7 @@
 """Moving a batch of twins forward in time, and what the station would receive from them."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +14,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 # the kernel is compiled for one kind of arrays; a read-only one would compile it again, for seconds
-WRITABLE = ("C", "W")
+WRITABLE: tuple[Literal["C"], Literal["W"]] = ("C", "W")
 
 
 @dataclass(frozen=True, eq=False)

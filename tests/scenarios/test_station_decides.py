@@ -19,7 +19,7 @@ def _scenario(name: str, *overrides: str) -> Scenario:
 def test_a_push_tells_dead_motors_from_a_stuck_gps(name: str, hypothesis: str, seed: int) -> None:
     rig, _, times = start(_scenario(name, f"seed={seed}"), scripted(0.8))
     run_until_ended(rig, times)
-    verdict = rig.node.station.verdict
+    verdict = rig.node.station.desk.verdict
     assert verdict is not None
     assert (verdict.sysid, verdict.hypothesis, verdict.decided) == (2, hypothesis, True)
 
@@ -27,7 +27,7 @@ def test_a_push_tells_dead_motors_from_a_stuck_gps(name: str, hypothesis: str, s
 def test_a_manoeuvre_that_touches_nobody_decides_nothing_and_the_fleet_holds() -> None:
     rig, heard, times = start(_scenario("rescue"), scripted(-0.3, seconds=1.0))
     run_until_ended(rig, times)
-    station = rig.node.station
+    station = rig.node.station.desk
     assert station.verdict is not None
     assert not station.verdict.decided
     assert len(heard.texts("plan")) == station.view.diagnosis.tries
@@ -40,7 +40,7 @@ def test_a_healthy_fleet_raises_no_alarm_while_it_is_probed() -> None:
         rig, heard, times = start(_scenario("healthy", f"seed={seed}"), scripted(0.0))
         run_until_ended(rig, times)
         assert heard.texts("anomaly") == []
-        assert rig.node.station.verdict is None
+        assert rig.node.station.desk.verdict is None
 
 
 def test_a_person_who_takes_over_keeps_the_vehicle() -> None:
@@ -55,9 +55,9 @@ def test_a_person_who_takes_over_keeps_the_vehicle() -> None:
             break
         assert time_s < 60.0
     assert any("rover_3" in text for text in heard.texts("takeover"))
-    assert rig.node.station.verdict is None
-    assert rig.node.station.fleet.tracks[2].status.mode == RoverMode.MANUAL
-    assert rig.node.station.fleet.tracks[0].status.mode == RoverMode.HOLD
+    assert rig.node.station.desk.verdict is None
+    assert rig.node.station.desk.fleet.tracks[2].status.mode == RoverMode.MANUAL
+    assert rig.node.station.desk.fleet.tracks[0].status.mode == RoverMode.HOLD
 
 
 @pytest.mark.parametrize("when", ["rover_2.east_m > 99", "rover_2.north_m < -2.9"])

@@ -1,0 +1,125 @@
+"""What the station knows and believes, and what it is about to say: the steps work on it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from base_station import execution, mission
+from base_station.diagnosis import Verdict
+from base_station.doubt import Doubt
+from base_station.execution import Orders
+from base_station.fleet import Fleet
+from base_station.hypotheses import Hypothesis
+from base_station.phases import AnyPhase, Connecting, Finished, Holding, Settling
+from base_station.planning.requests import Kind, PlanReady, PlanRequest
+from base_station.records import Event, EventKind
+from base_station.watch import Watch
+from hil.scenario import StationView
+
+Array = NDArray[np.float64]
+
+
+class Desk:
+    """Plain attributes; events and the plan request wait here for the end of the step."""
+
+    def __init__(self, view: StationView) -> None:
+        self.view = view
+        self.fleet = Fleet(view)
+        self.phase: AnyPhase = Connecting()
+        self.time_s = 0.0  # fleet time
+        self.orders: Orders = self.hold()
+        self.alarm = False  # was there ever one?
+        self.alarmed: dict[int, tuple[float, float]] = {}  # vehicle: last quiet, alarm (s)
+        self.doubt: Doubt | None = None
+        self.verdict: Verdict | None = None
+        self.tries = 0  # experiments on the present suspect
+        self.goals = mission.Goals.of(view)
+        self.mission_plans = 0
+        self.mission_s = 0.0  # on the way, planning not counted
+        self.answers: dict[int, PlanReady] = {}
+        self._watch: Watch | None = None
+        self._requests = 0
+        self._request: PlanRequest | None = None
+        self._events: list[Event] = []
+
+    @property
+    def watching(self) -> bool:
+        return self._watch is not None
+
+    @property
+    def watch(self) -> Watch:
+        """The believed twin; there is one from the first tick on."""
+        assert self._watch is not None
+        return self._watch
+
+    @watch.setter
+    def watch(self, watch: Watch) -> None:
+        self._watch = watch
+
+    @property
+    def open_doubt(self) -> Doubt:
+        """The doubt that the phase is about."""
+        assert self.doubt is not None
+        return self.doubt
+
+    @property
+    def ended(self) -> bool:
+        return isinstance(self.phase, Holding | Finished)
+
+    def hold(self) -> Orders:
+        return execution.hold(len(self.view.fleet))
+
+    def mean_report_m(self) -> Array:
+        """[V, 2] mean of the last second of reports of the fleet at rest."""
+        count = round(1.0 / self.fleet.period_s)
+        recent = [moment.frame.position_m for moment in list(self.watch.memory)[-count:]]
+        return np.asarray(np.nanmean(recent, axis=0))
+
+    def ask(
+        self,
+        kind: Kind,
+        hypotheses: tuple[Hypothesis, ...],
+        posterior: tuple[float, ...],
+        states: Array,
+    ) -> int:
+        """Put a request to the planner; returns its number."""
+        self._requests += 1
+        self._request = PlanRequest(
+            number=self._requests,
+            kind=kind,
+            seed=self.view.station_seed + self._requests,
+            preset=self.view.planning.preset,
+            hypotheses=hypotheses,
+            posterior=posterior,
+            states=states,
+            delivered=self.goals.delivered,
+        )
+        return self._requests
+
+    def suspect_the_worst(self) -> None:
+        """Stop everybody, then doubt the vehicle whose alarm stands out most."""
+        level = self.watch.cusum.level.max(axis=1)
+        suspect = max(self.alarmed, key=lambda i: float(level[i]))
+        self.enter(Settling(self.time_s, suspect, self.alarmed[suspect]))
+
+    def enter(self, phase: AnyPhase) -> None:
+        if phase.name != self.phase.name:
+            self.say("phase", phase.name)
+        self.phase = phase
+
+    def stop(self, reason: str) -> None:
+        """Hold for good."""
+        self.say("end", f"holding: {reason}")
+        self.enter(Holding(reason))
+
+    def say(self, kind: EventKind, text: str, **data: object) -> None:
+        self._events.append(Event(round(self.time_s, 3), kind, text, data))
+
+    def take_events(self) -> tuple[Event, ...]:
+        """What was said since the last call."""
+        events, self._events = tuple(self._events), []
+        return events
+
+    def take_request(self) -> PlanRequest | None:
+        """What the planner was asked since the last call."""
+        request, self._request = self._request, None
+        return request

@@ -1,0 +1,53 @@
+"""[0a]: is everybody there, and does everybody answer as its twin does?"""
+
+from base_station import execution, twin
+from base_station.commander import Commander
+from base_station.commands import Command
+from base_station.desk import Desk
+from base_station.execution import Orders
+from base_station.phases import Arming, Connecting, Probing
+from base_station.steps.travelling import request_beta
+from base_station.telemetry import Frame
+from base_station.watch import Baseline, Watch
+from hil.mavlink import RoverMode
+
+
+def get_ready(desk: Desk, commander: Commander) -> list[Command]:
+    """Wait for all vehicles, arm them in HOLD; then the ticks and the probe begin."""
+    tracks = desk.fleet.tracks
+    if isinstance(desk.phase, Connecting):
+        if not desk.fleet.complete:
+            return []
+        desk.say("link", f"{len(tracks)} vehicles heard, located and ready")
+        desk.enter(Arming())
+    commands = commander.carry_out(desk.orders, tracks, desk.time_s)
+    commands += commander.arm(tracks, desk.time_s)
+    if all(t.status.armed and t.status.mode == RoverMode.HOLD for t in tracks):
+        desk.fleet.start_ticks()
+        desk.watch = _fresh_watch(desk)
+        desk.enter(Probing(desk.time_s))
+    return commands
+
+
+def _fresh_watch(desk: Desk) -> Watch:
+    newest = [t.samples[-1] for t in desk.fleet.tracks]
+    state = twin.initial_state(
+        [s.position_m for s in newest], [t.status.yaw_rad for t in desk.fleet.tracks]
+    )
+    return Watch(desk.view, Baseline(twin.FleetModel.from_view(desk.view)), state, desk.time_s)
+
+
+def probe(desk: Desk, phase: Probing, frame: Frame) -> Orders:
+    """Pulse after pulse; then doubt whoever did not answer, or go on to the mission."""
+    pulses = execution.probe_pulses(len(desk.view.fleet))
+    pulse, driven = execution.pulse_at(pulses, frame.time_s - phase.since_s, desk.view)
+    if pulse is None:
+        if desk.alarmed:
+            desk.suspect_the_worst()
+        else:
+            desk.say("text", "all vehicles answer as their twins do")
+            request_beta(desk)
+        return desk.hold()
+    if not driven:
+        return desk.hold()
+    return execution.pulse_orders(pulse, float(frame.yaw_rad[pulse.vehicle]), desk.view)
