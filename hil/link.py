@@ -1,11 +1,15 @@
 """Links carry datagrams. The same code runs over UDP and over memory."""
 
 import socket
+import time
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Protocol, Self
 
 Address = tuple[str, int]
+MAX_GUESTS = 4
+GUEST_FORGOTTEN_S = 30.0
 
 # Where processes started by hand meet: the ports of ArduPilot's simulator, of QGroundControl, and
 # of our own. Vehicle i of the fleet uses base + 10 i.
@@ -88,6 +92,90 @@ class UdpLink:
                 continue  # the peer was not there for an earlier datagram
             self._peer = sender
             datagrams.append(data)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class UdpHub:
+    """A UDP socket with a host, whose address is given, and with guests who come by themselves.
+
+    Peers have numbers: 0 is the host, which nobody displaces, and guests count up from 1. A guest
+    is let in by a datagram that is welcome; there are at most four, and one that has been silent
+    for 30 s is forgotten. `now` is a monotonic clock in seconds.
+    """
+
+    def __init__(
+        self,
+        sock: socket.socket,
+        host: Address,
+        is_welcome: Callable[[bytes], bool],
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
+        sock.setblocking(False)
+        self._socket, self._is_welcome, self._now = sock, is_welcome, now
+        self._numbers: dict[Address, int] = {host: 0}
+        self._heard_s: dict[Address, float] = {}  # guests alone
+        self._invited = 0
+
+    @classmethod
+    def open(cls, host: Address, port: int, is_welcome: Callable[[bytes], bool]) -> Self:
+        """Speak to the host, from a port (0: any). Raises OSError when that is taken."""
+        sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            sock.bind(("", port))
+        except OSError:
+            sock.close()
+            raise
+        return cls(sock, host, is_welcome)
+
+    @property
+    def peers(self) -> tuple[int, ...]:
+        """The numbers of all who are there."""
+        return tuple(self._numbers.values())
+
+    def fileno(self) -> int:
+        """For `select`."""
+        return self._socket.fileno()
+
+    def send(self, peer: int, datagram: bytes) -> None:
+        """To one peer; dropped when it is gone."""
+        for address, number in self._numbers.items():
+            if number == peer:
+                with suppress(BlockingIOError, ConnectionRefusedError):  # UDP, as above
+                    self._socket.sendto(datagram, address)
+
+    def receive(self) -> list[tuple[int, bytes]]:
+        """All datagrams of host and guests with the number of their sender, oldest first."""
+        self._forget()
+        datagrams: list[tuple[int, bytes]] = []
+        while True:
+            try:
+                data, sender = self._socket.recvfrom(65535)
+            except BlockingIOError:
+                return datagrams
+            except ConnectionRefusedError:
+                continue
+            number = self._number(sender, data)
+            if number is not None:
+                datagrams.append((number, data))
+
+    def _number(self, sender: Address, data: bytes) -> int | None:
+        number = self._numbers.get(sender)
+        if number is None:
+            if len(self._heard_s) >= MAX_GUESTS or not self._is_welcome(data):
+                return None
+            self._invited += 1
+            number = self._numbers[sender] = self._invited
+        if number:
+            self._heard_s[sender] = self._now()
+        return number
+
+    def _forget(self) -> None:
+        now_s = self._now()
+        for guest, heard_s in list(self._heard_s.items()):
+            if now_s - heard_s > GUEST_FORGOTTEN_S:
+                del self._heard_s[guest], self._numbers[guest]
 
     def close(self) -> None:
         self._socket.close()

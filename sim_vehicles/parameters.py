@@ -29,6 +29,7 @@ class Parameters:
         self._parameters = {p.name: p for p in parameters}
         self._values = {p.name: p.default for p in self._parameters.values()}
         self.names = tuple(sorted(self._parameters))
+        self.revision = 0  # counts the changes
 
     def __contains__(self, name: str) -> bool:
         return name in self._parameters
@@ -51,8 +52,13 @@ class Parameters:
             return None if value == self._values[name] else ParamError.READ_ONLY
         if not parameter.low <= value <= parameter.high:
             return ParamError.VALUE_OUT_OF_RANGE
+        self.revision += value != self._values[name]
         self._values[name] = value
         return None
+
+    def changed(self) -> dict[str, float]:
+        """What is no longer as it was delivered."""
+        return {n: v for n, v in self._values.items() if v != self._parameters[n].default}
 
 
 def _fixed(name: str, value: float, param_type: ParamType = ParamType.INT16) -> Parameter:
@@ -67,6 +73,11 @@ def rover_parameters(sysid: int, station_sysid: int, airframe: Airframe) -> Para
     return Parameters(
         (
             _fixed("ARMING_CHECK", 1),  # all of them
+            Parameter("BATT_CRT_VOLT", 0, 0, 100),  # V, 0 is not watched
+            Parameter("BATT_FS_CRT_ACT", 0, 0, 2, int8),  # 0 report, 1 RTL, 2 hold
+            Parameter("BATT_FS_LOW_ACT", 0, 0, 2, int8),
+            Parameter("BATT_LOW_TIMER", 10, 0, 120, int8),  # s below, until it counts
+            Parameter("BATT_LOW_VOLT", 0, 0, 100),
             _fixed("CRUISE_SPEED", cruise_mps, ParamType.REAL32),
             _fixed("CRUISE_THROTTLE", 50, int8),
             _fixed("FORMAT_VERSION", 16),
@@ -76,6 +87,7 @@ def rover_parameters(sysid: int, station_sysid: int, airframe: Airframe) -> Para
             Parameter("FENCE_ENABLE", 0, 0, 1, int8),
             Parameter("FENCE_RADIUS", 300, 0.5, 10_000),
             Parameter("FENCE_TYPE", 6, 0, 7, int8),  # bits: 2 circle around home, 4 zones
+            Parameter("FS_EKF_ACTION", 1, 1, 2, int8),  # 1 hold, 2 report
             Parameter("FS_GCS_ENABLE", 1, 0, 1, int8),
             Parameter("FS_TIMEOUT", 5, 1, 100),
             _fixed("FS_ACTION", 2, int8),  # hold

@@ -1,21 +1,28 @@
-"""A MAVLink port: one link of the vehicle, with its own services, sequence and outbox.
+"""A MAVLink port: one peer of the vehicle, with its own streams, sequence and outbox.
 
-Nothing crosses from port to port: each knows only what its own services tell.
+Answers go to who asked. Stations share services, but never with the injector.
 """
 
 from collections.abc import Iterable
 
-from hil.mavlink import COMPONENT_AUTOPILOT, Decoder, Encoder, Message
+from hil.mavlink import COMPONENT_AUTOPILOT, Decoder, Encoder, Message, Signing
 from sim_vehicles.services.service import Handlers, Request
+from sim_vehicles.services.streams import StreamService
 
 
 class Port:
     """Hands what arrives to the service for it, and queues what is to be sent."""
 
-    def __init__(self, sysid: int, handlers: Handlers) -> None:
-        self._sysid, self._handlers = sysid, handlers
-        self._decoder = Decoder()
-        self._encoder = Encoder(sysid, COMPONENT_AUTOPILOT)
+    def __init__(
+        self,
+        sysid: int,
+        handlers: Handlers,
+        streams: StreamService,
+        signing: Signing | None = None,
+    ) -> None:
+        self._sysid, self._handlers, self._streams = sysid, handlers, streams
+        self._decoder = Decoder(signing)
+        self._encoder = Encoder(sysid, COMPONENT_AUTOPILOT, signing)
         self._outbox: list[bytes] = []
 
     def receive(self, datagram: bytes, now_s: float) -> None:
@@ -27,6 +34,12 @@ class Port:
             handler = self._handlers.get(type(value))
             if handler is not None:
                 self.send(handler(Request(now_s, received.sysid, received.compid, value)))
+
+    def step(self, now_s: float) -> None:
+        """Queue the streams that are due."""
+        messages = self._streams.step(now_s)
+        if messages:
+            self.send(messages)
 
     def send(self, messages: Iterable[Message]) -> None:
         self._outbox.extend(map(self._encoder.encode, messages))

@@ -6,7 +6,7 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,11 +14,21 @@ from types import FrameType
 
 from hil.errors import HilError, InputError
 from hil.impairment import impaired
-from hil.link import INJECTOR_PORT_BASE, MAVLINK_PORT_BASE, PHYSICS_PORT_BASE, Link, UdpLink
+from hil.link import (
+    INJECTOR_PORT_BASE,
+    MAVLINK_PORT_BASE,
+    PHYSICS_PORT_BASE,
+    Address,
+    Link,
+    UdpHub,
+    UdpLink,
+)
+from hil.mavlink import Decoder, Signing, key_of, ticks
 from hil.physics_link import PhysicsState
 from hil.scenario import Scenario, load_scenario
+from sim_vehicles.parameter_file import restored, written
 from sim_vehicles.physics_end import PhysicsEnd
-from sim_vehicles.vehicle import PortName, Vehicle
+from sim_vehicles.vehicle import Vehicle
 
 REPEAT_AFTER_S = 1.0
 PORT_STEP = 10
@@ -57,6 +67,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--mavlink-port", type=_port, metavar="P", help=_default(MAVLINK_PORT_BASE))
     parser.add_argument(
         "--injector-port", type=_port, metavar="P", help=_default(INJECTOR_PORT_BASE)
+    )
+    parser.add_argument(
+        "--listen-port", type=_port, metavar="P", default=0, help="where other stations find it"
+    )
+    parser.add_argument("--params", type=Path, metavar="FILE", help="keep changed parameters there")
+    parser.add_argument(
+        "--signing-key", type=Path, metavar="FILE", help="sign MAVLink with the pass phrase in it"
     )
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides")
     parser.add_argument("--seed", type=int, help="the same as --set seed=N")
@@ -104,16 +121,74 @@ def run(arguments: argparse.Namespace) -> None:
         raise InputError(f"--sysid {arguments.sysid} is not in the fleet; it has {sysids}")
     host = _resolved(arguments.host or scenario.links.host)
     ports = ports_of(scenario, arguments)
+    signing_for = None if arguments.signing_key is None else _signer(arguments.signing_key)
+    vehicle = Vehicle(scenario, arguments.sysid, signing_for)
+    keeper = None if arguments.params is None else ParameterKeeper(arguments.params, vehicle)
     with ExitStack() as stack:
         physics = UdpLink.connect(host, ports.physics)
         stack.callback(physics.close)
-        gcs = UdpLink.connect(host, ports.mavlink)
+        gcs = _hub((host, ports.mavlink), arguments.listen_port, signing_for)
         stack.callback(gcs.close)
         injector = _bound(host, ports.injector)
         stack.callback(injector.close)
-        shell = Shell(Vehicle(scenario, arguments.sysid), scenario, physics, gcs, injector)
+        shell = Shell(vehicle, scenario, physics, gcs, injector, keeper)
         print("ready", flush=True)
         shell.serve()
+
+
+SigningFor = Callable[[int], Signing]
+
+
+def _signer(path: Path) -> SigningFor:
+    """Signing for each link with the pass phrase in a file, on the wall clock."""
+    try:
+        phrase = path.read_text(encoding="utf-8").strip()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"--signing-key {path}: cannot be read: {error}") from None
+    if not phrase:
+        raise InputError(f"--signing-key {path}: is empty; it holds a pass phrase")
+    key = key_of(phrase)
+    return lambda link_id: Signing(key, link_id % 256, lambda: ticks(time.time()))
+
+
+def _hub(host: Address, port: int, signing_for: SigningFor | None) -> UdpHub:
+    """A stranger has to say something valid, and signed if we sign, before it is listened to."""
+
+    def is_welcome(datagram: bytes) -> bool:
+        return bool(Decoder(signing_for(0) if signing_for else None).decode(datagram))
+
+    try:
+        return UdpHub.open(host, port, is_welcome)
+    except OSError as error:
+        raise InputError(
+            f"--listen-port {port} cannot be bound: {error.strerror}; choose another"
+        ) from None
+
+
+class ParameterKeeper:
+    """Keeps changed parameters in a file: read at the start, written after each change."""
+
+    def __init__(self, path: Path, vehicle: Vehicle) -> None:
+        self._path, self._parameters = path, vehicle.parameters
+        try:
+            text = path.read_text(encoding="utf-8") if path.exists() else ""
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(f"--params {path}: cannot be read: {error}") from None
+        for complaint in restored(self._parameters, text):
+            print(f"{path}: {complaint}", file=sys.stderr, flush=True)
+        self._revision = self._parameters.revision
+
+    def keep(self) -> None:
+        """Write what has changed, whole or not at all."""
+        if self._parameters.revision == self._revision:
+            return
+        self._revision = self._parameters.revision
+        draft = self._path.with_name(self._path.name + ".new")
+        try:
+            draft.write_text(written(self._parameters), encoding="utf-8")
+            draft.replace(self._path)
+        except OSError as error:
+            print(f"{self._path}: cannot be written: {error}", file=sys.stderr, flush=True)
 
 
 def _resolved(host: str) -> str:
@@ -140,14 +215,14 @@ class Shell:
         vehicle: Vehicle,
         scenario: Scenario,
         physics: UdpLink,
-        gcs: UdpLink,
+        gcs: UdpHub,
         injector: UdpLink,
+        keeper: ParameterKeeper | None,
     ) -> None:
-        self._vehicle, self._physics = vehicle, physics
+        self._vehicle, self._physics, self._scenario = vehicle, physics, scenario
         self._end = PhysicsEnd(scenario.clock.autopilot_hz)
-        self._sources = (physics, gcs, injector)
-        radio = impaired(gcs, scenario, vehicle.sysid, lambda: vehicle.time_s)
-        self._mavlink: dict[PortName, Link] = {"gcs": radio, "injector": injector}
+        self._gcs, self._injector, self._keeper = gcs, injector, keeper
+        self._radios: dict[int, Link] = {0: self._radio(0)}
 
     def serve(self) -> None:
         """Frame after frame, for ever."""
@@ -158,28 +233,47 @@ class Shell:
 
     def _exchange(self, frame: bytes) -> PhysicsState:
         """Send a frame and wait for its reply, repeating the frame each second."""
+        sources = [link.fileno() for link in (self._physics, self._gcs, self._injector)]
         repeat_s = 0.0
         while True:
             now_s = time.monotonic()
             if now_s >= repeat_s:
                 self._physics.send(frame)
                 repeat_s = now_s + REPEAT_AFTER_S
-            select.select(self._sources, [], [], repeat_s - now_s)
+            select.select(sources, [], [], repeat_s - now_s)
             self._receive_mavlink()
             state = self._end.accept(self._physics.receive())
             if state is not None:
                 return state
 
     def _receive_mavlink(self) -> None:
-        for port, link in self._mavlink.items():
-            for datagram in link.receive():
-                self._vehicle.receive(port, datagram)
+        self._meet()
+        for peer, radio in self._radios.items():
+            for datagram in radio.receive():
+                self._vehicle.receive("gcs", datagram, peer)
+        for datagram in self._injector.receive():
+            self._vehicle.receive("injector", datagram)
         self._send_mavlink()
+        if self._keeper is not None:
+            self._keeper.keep()
+
+    def _meet(self) -> None:
+        """Stations that come get a link, and those that have gone are forgotten."""
+        peers = self._gcs.peers()
+        if self._radios.keys() != set(peers):
+            self._radios = {p: self._radios.get(p) or self._radio(p) for p in peers}
+            self._vehicle.keep(peers)
+
+    def _radio(self, peer: int) -> Link:
+        end, vehicle = self._gcs.end(peer), self._vehicle
+        return impaired(end, self._scenario, vehicle.sysid, lambda: vehicle.time_s)
 
     def _send_mavlink(self) -> None:
-        for port, link in self._mavlink.items():
-            for datagram in self._vehicle.outbox(port):
-                link.send(datagram)
+        for peer, radio in self._radios.items():
+            for datagram in self._vehicle.outbox("gcs", peer):
+                radio.send(datagram)
+        for datagram in self._vehicle.outbox("injector"):
+            self._injector.send(datagram)
 
 
 if __name__ == "__main__":

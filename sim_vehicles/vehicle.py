@@ -4,7 +4,7 @@ Time is physics time. One `step` is one frame of the autopilot: physics state in
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Literal
@@ -20,6 +20,7 @@ from hil.mavlink import (
     Result,
     RoverMode,
     Severity,
+    Signing,
     StatusText,
 )
 from hil.physics_link import PhysicsState, pad_channels
@@ -39,12 +40,12 @@ from sim_vehicles.control import Drive, Memory, velocity_towards
 from sim_vehicles.damage import MotorOutputs
 from sim_vehicles.escs import esc_telemetry
 from sim_vehicles.estimator import Estimate, Estimator
-from sim_vehicles.failsafes import Breaches, Signs, trips
+from sim_vehicles.failsafes import Breaches, Sagging, Signs, complaints, trips
 from sim_vehicles.flying import climb_to
 from sim_vehicles.innovation import Innovation, innovation
 from sim_vehicles.mission import Surroundings
 from sim_vehicles.navigator import Navigator
-from sim_vehicles.parameters import rover_parameters
+from sim_vehicles.parameters import Parameters, rover_parameters
 from sim_vehicles.port import Port
 from sim_vehicles.sensors import Gps, GpsFix, Inertial, InertialSensors, Vector
 from sim_vehicles.services import ftp, time
@@ -106,9 +107,17 @@ def default_rates_hz(telemetry_hz: float) -> dict[int, float]:
 
 
 class Vehicle:
-    """One simulated rover. `receive` answers at once into the outbox of the same port."""
+    """One simulated rover. `receive` answers at once into the outbox of the same port.
 
-    def __init__(self, scenario: Scenario, sysid: int) -> None:
+    `signing_for` makes the signing of a station's port; without it nothing is signed.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        sysid: int,
+        signing_for: Callable[[int], Signing] | None = None,
+    ) -> None:
         member = scenario.vehicle(sysid)
         self._sysid, self._origin = sysid, scenario.origin.origin()
         self._drive = Drive.of(member.frame, scenario.yaw == "locked")
@@ -118,7 +127,7 @@ class Vehicle:
         self._parameters = rover_parameters(sysid, scenario.links.station_sysid, member.frame)
         self._autopilot = Autopilot()
         self._navigator = Navigator(self._origin)
-        self._breaches = Breaches()
+        self._breaches, self._sagging = Breaches(), Sagging()
         self._battery = BatteryState()
         self._memory = Memory()
         self._outputs = MotorOutputs(member.frame)
@@ -130,38 +139,34 @@ class Vehicle:
         self._fix: GpsFix | None = None
         self._home_m: Vector | None = None
         self._pwm = pad_channels(())
-        self._connect(scenario.clock.telemetry_hz)
+        self._telemetry_hz, self._signing_for = scenario.clock.telemetry_hz, signing_for
+        self._connect()
 
-    def _connect(self, telemetry_hz: int) -> None:
-        """Two ports with services of their own; only the injector's can break the vehicle."""
-        builders: dict[int, Builder] = {
-            number: partial(self._build, build) for number, build in _TELEMETRY.items()
-        }
+    def _connect(self) -> None:
+        """The services of all stations, and the injector's, which alone can break the vehicle."""
         modes = ModeService(self._apply)
         setpoints = SetpointService(self._origin, self._estimator.estimate, self._apply)
         fence = FenceService(self._parameters, self._navigator)
         self._missions = MissionService(self._navigator, self._origin, self._home, self._apply)
         self._piloting = PilotingService()
-        streams = StreamService(builders, default_rates_hz(telemetry_hz))
-        commanded = (streams, modes, setpoints, fence, self._missions)
-        commands = CommandService({k: v for s in commanded for k, v in s.executors().items()})
-        parameters = ParameterService(self._parameters)
-        served = (commands, parameters, modes, setpoints, self._piloting, self._missions, streams)
-        gcs = merged(
+        table = ParameterService(self._parameters)
+        commanded = (modes, setpoints, fence, self._missions)
+        self._executors = {k: v for s in commanded for k, v in s.executors().items()}
+        self._handlers = merged(
             {Heartbeat: self._heard},
-            *(service.handlers() for service in served),
+            *(s.handlers() for s in (table, modes, setpoints, self._piloting, self._missions)),
             *(module.handlers() for module in (time, ftp)),
         )
         sizes = injection_parameters()
         self._failures = FailureService(sizes, self._drive.airframe)
-        beats = StreamService(builders, {MessageId.HEARTBEAT: 1.0})
+        beats = StreamService(self._builders(), {MessageId.HEARTBEAT: 1.0})
         injector = merged(
             CommandService({**beats.executors(), **self._failures.executors()}).handlers(),
             ParameterService(sizes).handlers(),
             *(module.handlers() for module in (time, ftp)),
         )
-        self._ports = {"gcs": Port(self._sysid, gcs), "injector": Port(self._sysid, injector)}
-        self._streams = (("gcs", streams), ("injector", beats))
+        self._injector = Port(self._sysid, injector, beats)
+        self._stations = {0: self._station_port(0)}
 
     @property
     def sysid(self) -> int:
@@ -172,13 +177,44 @@ class Vehicle:
         """Physics time of the last step."""
         return self._now_s or 0.0
 
-    def receive(self, port: PortName, datagram: bytes) -> None:
-        """Handle a datagram now. Bad frames and frames for others change nothing."""
-        self._ports[port].receive(datagram, self._now_s or 0.0)
+    def _builders(self) -> dict[int, Builder]:
+        return {number: partial(self._build, build) for number, build in _TELEMETRY.items()}
 
-    def outbox(self, port: PortName) -> list[bytes]:
+    def _station_port(self, peer: int) -> Port:
+        """A port for one more station: shared services, streams and signatures of its own."""
+        streams = StreamService(self._builders(), default_rates_hz(self._telemetry_hz))
+        commands = CommandService({**streams.executors(), **self._executors})
+        handlers = merged(self._handlers, commands.handlers(), streams.handlers())
+        signing = self._signing_for(peer) if self._signing_for else None
+        return Port(self._sysid, handlers, streams, signing)
+
+    def _port(self, name: PortName, peer: int) -> Port:
+        if name == "injector":
+            return self._injector
+        if peer not in self._stations:
+            self._stations[peer] = self._station_port(peer)
+        return self._stations[peer]
+
+    @property
+    def parameters(self) -> Parameters:
+        """What a station may set; for whoever keeps them."""
+        return self._parameters
+
+    def receive(self, port: PortName, datagram: bytes, peer: int = 0) -> None:
+        """Handle a datagram now. Bad frames and frames for others change nothing.
+
+        `peer` tells stations apart; one that is new gets a port of its own.
+        """
+        self._port(port, peer).receive(datagram, self._now_s or 0.0)
+
+    def keep(self, peers: Collection[int]) -> None:
+        """Forget the stations that are not among these; number 0 stays."""
+        for gone in self._stations.keys() - {0, *peers}:
+            del self._stations[gone]
+
+    def outbox(self, port: PortName, peer: int = 0) -> list[bytes]:
         """Frames to send on a port since the last call, oldest first."""
-        return self._ports[port].drain()
+        return self._port(port, peer).drain()
 
     def step(self, state: PhysicsState) -> tuple[int, ...]:
         """One frame: 16 PWM values (us) for the physics, after motor faults.
@@ -193,10 +229,8 @@ class Vehicle:
             self._watch(state.time_s)
             self._navigate(state.time_s)
             self._pwm = self._control(dt_s)
-            for port, streams in self._streams:
-                messages = streams.step(state.time_s)
-                if messages:
-                    self._ports[port].send(messages)
+            for port in (*self._stations.values(), self._injector):
+                port.step(state.time_s)
         return self._broken(self._pwm)
 
     def _sense(self, state: PhysicsState, dt_s: float) -> None:
@@ -217,17 +251,24 @@ class Vehicle:
     def _watch(self, now_s: float) -> None:
         """Time-outs and failsafes."""
         self._breaches = self._breaches.at(now_s, self._is_outside())
-        heard = self._gcs_heard_s
-        signs = Signs(
-            gcs_silence_s=None if heard is None else now_s - heard,
-            outside=self._breaches.outside,
-            mode=self._autopilot.mode,
-        )
+        self._sagging = self._sagging.at(now_s, self._battery.voltage_v, self._parameters)
+        signs = self._signs()
         for trip in trips(signs, self._parameters):
             self._apply(partial(_checked, trip.which, trip.tripped, trip.action))
         released = self._piloting.sticks.are_released(now_s)
         self._apply(lambda state, _ready: check_sticks(state, released))
         self._apply(lambda state, _ready: check_target(state, now_s))
+
+    def _signs(self) -> Signs:
+        now_s, heard_s = self._now_s or 0.0, self._gcs_heard_s
+        return Signs(
+            now_s=now_s,
+            mode=self._autopilot.mode,
+            gcs_silence_s=None if heard_s is None else now_s - heard_s,
+            fix_age_s=self._estimator.fix_age_s if self._home_m else None,
+            sagging=self._sagging,
+            outside=self._breaches.outside,
+        )
 
     def _is_outside(self) -> bool:
         if self._home_m is None or not self._parameters["FENCE_ENABLE"]:
@@ -302,8 +343,10 @@ class Vehicle:
         return transition.result
 
     def _readiness(self) -> Readiness:
-        outside = ("vehicle outside fence",) if self._breaches.outside else ()
-        return Readiness(self._estimator.ready, self._navigator.has_mission, outside)
+        signs = self._signs()
+        placed = self._estimator.ready and not signs.gps_lost
+        told = complaints(signs, self._parameters)
+        return Readiness(placed, self._navigator.has_mission, told)
 
     def _home(self) -> HomePosition | None:
         return telemetry.home_position(self._snapshot())
@@ -314,9 +357,11 @@ class Vehicle:
         return []
 
     def _tell(self, messages: Sequence[Message]) -> None:
-        """Texts go to everybody, the rest to the station's port."""
-        for name, port in self._ports.items() if messages else ():
-            port.send(m for m in messages if name == "gcs" or isinstance(m, StatusText))
+        """To every station; the injector gets the texts."""
+        if messages:
+            for port in self._stations.values():
+                port.send(messages)
+            self._injector.send(m for m in messages if isinstance(m, StatusText))
 
     def _build(self, build: Callable[[Snapshot], Message | None]) -> Message | None:
         return build(self._snapshot())

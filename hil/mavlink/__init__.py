@@ -90,6 +90,11 @@ from hil.mavlink.services import (
     Ping,
     Timesync,
 )
+from hil.mavlink.signing import (
+    Signing,
+    key_of,
+    ticks,
+)
 from hil.mavlink.telemetry import (
     Attitude,
     AutopilotVersion,
@@ -184,6 +189,7 @@ __all__ = [
     "ServoOutputs",
     "SetMode",
     "Severity",
+    "Signing",
     "StatusText",
     "SysStatus",
     "SystemStatus",
@@ -191,5 +197,7 @@ __all__ = [
     "TypeMask",
     "Vector",
     "VfrHud",
+    "key_of",
     "stick",
+    "ticks",
 ]

@@ -13,11 +13,11 @@ from pymavlink.dialects.v20 import ardupilotmega
 
 from hil.mavlink import condition, missions, piloting, requests, services, telemetry
 from hil.mavlink.message import Message
+from hil.mavlink.signing import SIGNATURE_BYTES, Signing
 
 MARKER_V1, MARKER_V2 = 0xFE, 0xFD
 HEADER_V1, HEADER_V2 = 6, 10  # bytes, with the marker
 CHECKSUM = 2
-SIGNATURE = 13
 FLAG_SIGNED = 1
 
 
@@ -61,10 +61,12 @@ class Decoder:
     """Bytes to values. It keeps no bytes between datagrams; it counts what it dropped.
 
     A frame whose checksum is wrong is dropped whether or not it says it is signed: MAVLink's C
-    parser accepts such a frame when signing is off, and one has disarmed a rover.
+    parser accepts such a frame when signing is off, and one has disarmed a rover. With `signing`
+    only signed frames count; without it signatures are not looked at.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, signing: Signing | None = None) -> None:
+        self._signing = signing
         self.dropped = 0  # stretches of bytes or frames that gave no value
 
     def decode(self, datagram: bytes) -> list[Received]:
@@ -72,7 +74,7 @@ class Decoder:
         received = []
         at = 0
         while at < len(datagram):
-            end, value = _frame_at(datagram, at)
+            end, value = _frame_at(datagram, at, self._signing)
             if value is not None:
                 received.append(value)
             else:
@@ -81,7 +83,7 @@ class Decoder:
         return received
 
 
-def _frame_at(data: bytes, at: int) -> tuple[int, Received | None]:
+def _frame_at(data: bytes, at: int, signing: Signing | None) -> tuple[int, Received | None]:
     """Where to look for the next frame, and what the one at `at` says if it is good."""
     if data[at] == MARKER_V2:
         header = HEADER_V2
@@ -98,13 +100,15 @@ def _frame_at(data: bytes, at: int) -> tuple[int, Received | None]:
     else:
         sysid, compid, number = data[at + 3], data[at + 4], data[at + 5]
     payload_end = at + header + data[at + 1]
-    end = payload_end + CHECKSUM + (SIGNATURE if flags & FLAG_SIGNED else 0)
+    end = payload_end + CHECKSUM + (SIGNATURE_BYTES if flags & FLAG_SIGNED else 0)
     layout = _LAYOUTS.get(number)
     if layout is None or flags & ~FLAG_SIGNED or end > len(data):
         return _next_marker(data, at + 1), None
     checksum = data[payload_end] | data[payload_end + 1] << 8
     if checksum != mcrf4xx(data[at + 1 : payload_end] + layout.crc_extra):
         return _next_marker(data, at + 1), None
+    if signing and not (flags and signing.accepts(data[at:end], sysid, compid)):
+        return end, None
     value = _value(layout, data[at + header : payload_end])
     return end, None if value is None else Received(sysid, compid, value)
 
@@ -124,10 +128,10 @@ def _value(layout: _Layout, payload: bytes) -> Message | Other | None:
 
 
 class Framer:
-    """Values to MAVLink 2 frames of one sender, sequence numbers counted."""
+    """Values to MAVLink 2 frames of one sender, sequence numbers counted; signed if wanted."""
 
-    def __init__(self, sysid: int, compid: int) -> None:
-        self.sysid, self.compid = sysid, compid
+    def __init__(self, sysid: int, compid: int, signing: Signing | None = None) -> None:
+        self.sysid, self.compid, self._signing = sysid, compid, signing
         self._sequence = 0
 
     def encode(self, value: Message) -> bytes:
@@ -136,7 +140,9 @@ class Framer:
         layout = _LAYOUTS[number]
         payload = layout.packing.pack(*value.to_wire()).rstrip(b"\0") or b"\0"
         ids = bytes((self.sysid, self.compid)) + number.to_bytes(3, "little")
-        body = bytes((len(payload), 0, 0, self._sequence)) + ids + payload
+        flags = FLAG_SIGNED if self._signing else 0
+        body = bytes((len(payload), flags, 0, self._sequence)) + ids + payload
         self._sequence = (self._sequence + 1) % 256
         checksum = mcrf4xx(body + layout.crc_extra)
-        return b"\xfd" + body + checksum.to_bytes(2, "little")
+        frame = b"\xfd" + body + checksum.to_bytes(2, "little")
+        return self._signing.sign(frame) if self._signing else frame

@@ -26,8 +26,11 @@ def test_faults_are_acknowledged_before_the_first_reply_of_the_world() -> None:
     injector = Encoder(251, 190)
     with rover_process() as rover:
         assert rover.first_line == "ready\n"
-        size, command = ask(
-            rover, injector.param_set(2, "SIM_GPS1_STUCK", 2.0), injector.inject_failure(2, 4, 2, 0)
+        _gate, size, command = ask(
+            rover,
+            injector.param_set(2, "SYS_FAILURE_EN", 1.0),
+            injector.param_set(2, "SIM_GPS1_STUCK", 2.0),
+            injector.inject_failure(2, 4, 2, 0),
         )
         assert isinstance(size, ParamValue)
         assert isinstance(command, CommandAck)
