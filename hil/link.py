@@ -117,6 +117,7 @@ class UdpHub:
         self._numbers: dict[Address, int] = {host: 0}
         self._heard_s: dict[Address, float] = {}  # guests alone
         self._invited = 0
+        self._inboxes: dict[int, list[bytes]] = {}
 
     @classmethod
     def open(cls, host: Address, port: int, is_welcome: Callable[[bytes], bool]) -> Self:
@@ -129,36 +130,43 @@ class UdpHub:
             raise
         return cls(sock, host, is_welcome)
 
-    @property
     def peers(self) -> tuple[int, ...]:
-        """The numbers of all who are there."""
+        """The numbers of all who are there now."""
+        self._poll()
         return tuple(self._numbers.values())
 
     def fileno(self) -> int:
         """For `select`."""
         return self._socket.fileno()
 
+    def end(self, peer: int) -> "HubEnd":
+        """The link to one peer; what is sent after it has gone is dropped."""
+        return HubEnd(self, peer)
+
     def send(self, peer: int, datagram: bytes) -> None:
-        """To one peer; dropped when it is gone."""
         for address, number in self._numbers.items():
             if number == peer:
                 with suppress(BlockingIOError, ConnectionRefusedError):  # UDP, as above
                     self._socket.sendto(datagram, address)
 
-    def receive(self) -> list[tuple[int, bytes]]:
-        """All datagrams of host and guests with the number of their sender, oldest first."""
+    def take(self, peer: int) -> list[bytes]:
+        """What has arrived from one peer, oldest first."""
+        self._poll()
+        return self._inboxes.pop(peer, [])
+
+    def _poll(self) -> None:
+        """Sort what is there by who sent it; of strangers nothing is kept."""
         self._forget()
-        datagrams: list[tuple[int, bytes]] = []
         while True:
             try:
                 data, sender = self._socket.recvfrom(65535)
             except BlockingIOError:
-                return datagrams
+                return
             except ConnectionRefusedError:
                 continue
             number = self._number(sender, data)
             if number is not None:
-                datagrams.append((number, data))
+                self._inboxes.setdefault(number, []).append(data)
 
     def _number(self, sender: Address, data: bytes) -> int | None:
         number = self._numbers.get(sender)
@@ -175,7 +183,21 @@ class UdpHub:
         now_s = self._now()
         for guest, heard_s in list(self._heard_s.items()):
             if now_s - heard_s > GUEST_FORGOTTEN_S:
-                del self._heard_s[guest], self._numbers[guest]
+                self._inboxes.pop(self._numbers.pop(guest), None)
+                del self._heard_s[guest]
 
     def close(self) -> None:
         self._socket.close()
+
+
+class HubEnd:
+    """A hub's link to one of its peers."""
+
+    def __init__(self, hub: UdpHub, peer: int) -> None:
+        self._hub, self._peer = hub, peer
+
+    def send(self, datagram: bytes) -> None:
+        self._hub.send(self._peer, datagram)
+
+    def receive(self) -> list[bytes]:
+        return self._hub.take(self._peer)

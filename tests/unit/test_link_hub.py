@@ -49,7 +49,7 @@ def hub(sockets: list[socket.socket], clock: Clock) -> Iterator[UdpHub]:
 def said(hub: UdpHub, sock: socket.socket, data: bytes) -> list[tuple[int, bytes]]:
     sock.sendto(data, hub.address)  # type: ignore[attr-defined]
     assert select.select([hub], [], [], 5.0)[0]
-    return hub.receive()
+    return [(peer, data) for peer in hub.peers() for data in hub.end(peer).receive()]
 
 
 def test_the_host_is_spoken_to_first_and_never_displaced(
@@ -57,8 +57,8 @@ def test_the_host_is_spoken_to_first_and_never_displaced(
 ) -> None:
     host, guest, *_ = sockets
     assert said(hub, guest, b"hello") == [(1, b"hello")]
-    hub.send(0, b"to the host")
-    hub.send(1, b"to the guest")
+    hub.end(0).send(b"to the host")
+    hub.end(1).send(b"to the guest")
     assert host.recv(100) == b"to the host"
     assert guest.recv(100) == b"to the guest"
     assert said(hub, host, b"anything") == [(0, b"anything")]
@@ -69,7 +69,7 @@ def test_who_is_not_welcome_is_not_heard_until_it_behaves(
 ) -> None:
     guest = sockets[1]
     assert said(hub, guest, b"noise") == []
-    assert hub.peers == (0,)
+    assert hub.peers() == (0,)
     assert said(hub, guest, b"hello") == [(1, b"hello")]
     assert said(hub, guest, b"noise") == [(1, b"noise")]
 
@@ -85,12 +85,12 @@ def test_guests_are_bounded_and_forgotten(
     assert said(hub, sockets[1], b"still here") == [(1, b"still here")]
     clock.now_s += 1.0
     assert said(hub, late, b"hello") == [(MAX_GUESTS + 1, b"hello")]
-    assert hub.peers == (0, 1, MAX_GUESTS + 1)
-    hub.send(2, b"nobody")  # is dropped
+    assert hub.peers() == (0, 1, MAX_GUESTS + 1)
+    hub.end(2).send(b"nobody")  # is dropped
 
 
 def test_an_absent_host_does_no_harm(hub: UdpHub, sockets: list[socket.socket]) -> None:
     sockets[0].close()
     for _ in range(3):
-        hub.send(0, b"anybody?")
-    assert hub.receive() == []
+        hub.end(0).send(b"anybody?")
+    assert hub.end(0).receive() == []
