@@ -59,6 +59,7 @@ class Memory:
     z: float = 0.0
     down_m: float | None = None
     airborne: bool = False
+    landing: bool = False
     resting_s: float = 0.0
 
     def afresh(self, yaw_rad: float) -> "Memory":

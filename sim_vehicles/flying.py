@@ -54,6 +54,11 @@ def landing_speed(airframe: Airframe, height_m: float) -> float:
     return max(airframe.flight.landing_mps, _limited(airframe, HEIGHT_GAIN * (height_m - 2.0)))
 
 
+def land(memory: Memory) -> Memory:
+    """From now on it sinks at `landing_speed`, until `has_landed` or a change of mode."""
+    return replace(memory, landing=memory.airborne)
+
+
 def has_landed(memory: Memory) -> bool:
     """It has wanted to sink for a second, and stood still."""
     return memory.resting_s >= LANDED_AFTER_S

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from enum import IntEnum
 
 from hil.airframe import pwm_to_output
 from hil.frames import Origin, ned_to_wgs84
@@ -10,6 +11,7 @@ from hil.mavlink import (
     MODE_FLAG_CUSTOM,
     MODE_FLAG_GUIDED,
     MODE_FLAG_MANUAL,
+    TYPE_QUADROTOR,
     TYPE_ROVER,
     Attitude,
     AutopilotVersion,
@@ -44,7 +46,6 @@ from sim_vehicles.innovation import Innovation
 from sim_vehicles.sensors import GpsFix, Inertial, Vector
 from sim_vehicles.services.piloting import Sticks
 
-ON_GROUND = 1  # MAV_LANDED_STATE_ON_GROUND
 SATELLITES, HDOP = 18, 0.7
 CPU_LOAD = 0.25
 VERSION = (4, 6, 0, 255)  # the ArduPilot release whose behaviour is followed; 255 is 'official'
@@ -69,6 +70,14 @@ _EKF_WITH_GPS = (
 _WHEN_READY = Sensor.AHRS | Sensor.PREARM_CHECK
 
 
+class LandedState(IntEnum):
+    """MAV_LANDED_STATE."""
+
+    ON_GROUND = 1
+    IN_AIR = 2
+    LANDING = 4
+
+
 @dataclass(frozen=True, slots=True)
 class Snapshot:
     """All that telemetry may tell. There is no fault in it, so none can be told."""
@@ -89,14 +98,17 @@ class Snapshot:
     innovation: Innovation
     escs: EscTelemetry
     sticks: Sticks
+    flies: bool = False
+    landed: LandedState = LandedState.ON_GROUND
 
 
 def heartbeat(s: Snapshot) -> Heartbeat:
     status = system_status(s.autopilot, s.ready)
     base_mode = MODE_FLAG_CUSTOM | _MODE_FLAGS.get(s.autopilot.mode, 0)
     mode = s.autopilot.mode
+    kind = TYPE_QUADROTOR if s.flies else TYPE_ROVER
     return Heartbeat(
-        TYPE_ROVER, AUTOPILOT_ARDUPILOT, s.autopilot.armed, int(mode), int(status), base_mode
+        kind, AUTOPILOT_ARDUPILOT, s.autopilot.armed, int(mode), int(status), base_mode
     )
 
 
@@ -153,8 +165,8 @@ def battery_status(s: Snapshot) -> Battery:
     return Battery(b.voltage_v, b.current_a, b.consumed_mah, b.remaining_percent)
 
 
-def extended_sys_state(_s: Snapshot) -> ExtendedSysState:
-    return ExtendedSysState(ON_GROUND)
+def extended_sys_state(s: Snapshot) -> ExtendedSysState:
+    return ExtendedSysState(int(s.landed))
 
 
 def home_position(s: Snapshot) -> HomePosition | None:

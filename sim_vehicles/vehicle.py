@@ -30,10 +30,13 @@ from sim_vehicles.autopilot import (
     Autopilot,
     Failsafe,
     Readiness,
+    Target,
     Transition,
+    accept_target,
     check,
     check_sticks,
     check_target,
+    disarm,
 )
 from sim_vehicles.battery import BatteryState, drain
 from sim_vehicles.control import Drive, Memory, velocity_towards
@@ -41,7 +44,7 @@ from sim_vehicles.damage import MotorOutputs
 from sim_vehicles.escs import esc_telemetry
 from sim_vehicles.estimator import Estimate, Estimator
 from sim_vehicles.failsafes import Breaches, Sagging, Signs, complaints, trips
-from sim_vehicles.flying import climb_to
+from sim_vehicles.flying import climb_to, has_landed, land, landing_speed, settle, take_off
 from sim_vehicles.innovation import Innovation, innovation
 from sim_vehicles.mission import Surroundings
 from sim_vehicles.navigator import Navigator
@@ -52,6 +55,7 @@ from sim_vehicles.services import ftp, time
 from sim_vehicles.services.commands import CommandService
 from sim_vehicles.services.failure import FailureService, injection_parameters
 from sim_vehicles.services.fence import FenceService
+from sim_vehicles.services.flight import FlightService
 from sim_vehicles.services.mission import MissionService
 from sim_vehicles.services.mode import Change, ModeService
 from sim_vehicles.services.parameters import ParameterService
@@ -60,7 +64,7 @@ from sim_vehicles.services.service import Replies, Request, merged
 from sim_vehicles.services.setpoints import SetpointService
 from sim_vehicles.services.streams import Builder, StreamService
 from sim_vehicles.steering import steer
-from sim_vehicles.telemetry import Snapshot
+from sim_vehicles.telemetry import LandedState, Snapshot
 
 PortName = Literal["gcs", "injector"]
 FIX_LOST_AFTER_S = 1.0  # without a fix for so long, telemetry says that there is none
@@ -152,6 +156,8 @@ class Vehicle:
         table = ParameterService(self._parameters)
         commanded = (modes, setpoints, fence, self._missions)
         self._executors = {k: v for s in commanded for k, v in s.executors().items()}
+        if self._drive.airframe.flight:
+            self._executors |= FlightService(self._take_off, self._land).executors()
         self._handlers = merged(
             {Heartbeat: self._heard},
             *(s.handlers() for s in (table, modes, setpoints, self._piloting, self._missions)),
@@ -296,23 +302,51 @@ class Vehicle:
     def _control(self, dt_s: float) -> tuple[int, ...]:
         """PWM as commanded, 16 channels."""
         estimate = self._estimator.estimate()
-        if not self._autopilot.drives:
-            self._memory = self._memory.afresh(estimate.yaw_rad)
+        if not (self._autopilot.drives or self._hovers):
+            self._memory = settle(self._memory.afresh(estimate.yaw_rad))
             self._battery = drain(self._battery, (), dt_s)
             return pad_channels([output_to_pwm(None)] * len(self._drive.airframe.motors))
-        if self._autopilot.mode is RoverMode.MANUAL:
+        if self._autopilot.mode is RoverMode.MANUAL and not self._hovers:
             sticks = self._piloting.sticks
             airframe = self._drive.airframe
             outputs = mix(airframe, sticks.throttle, sticks.lateral, sticks.steering)
         else:
             velocity = self._aim(estimate, dt_s)
             outputs, self._memory = steer(self._drive, self._memory, estimate, velocity, dt_s)
+            if self._memory.landing and has_landed(self._memory):
+                self._memory = settle(self._memory)
+                self._apply(lambda state, _ready: disarm(state))
         self._battery = drain(self._battery, outputs, dt_s)
         return pad_channels([output_to_pwm(output) for output in outputs])
+
+    @property
+    def _hovers(self) -> bool:
+        """In the air no mode cuts the rotors."""
+        return self._autopilot.armed and self._memory.airborne
+
+    def _take_off(self, height_m: float) -> Result:
+        """In GUIDED, armed: rise to a height above home, here."""
+        guided = self._autopilot.armed and self._autopilot.mode is RoverMode.GUIDED
+        if not guided or self._home_m is None:
+            return Result.FAILED
+        north, east, _ = self._estimator.estimate().position_m
+        point = Target(self.time_s, position_m=(north, east), down_m=self._home_m[2] - height_m)
+        self._memory = take_off(self._memory)
+        self._autopilot = accept_target(self._autopilot, point)
+        return Result.ACCEPTED
+
+    def _land(self) -> Result:
+        if not self._hovers:
+            return Result.FAILED
+        self._memory = land(self._memory)
+        return Result.ACCEPTED
 
     def _aim(self, estimate: Estimate, dt_s: float) -> Vector:
         """The velocity that the target asks for now; turns the heading to hold towards it."""
         target = self._autopilot.target
+        if self._memory.landing:
+            height_m = (self._home_m or (0.0, 0.0, 0.0))[2] - estimate.position_m[2]
+            return 0.0, 0.0, landing_speed(self._drive.airframe, height_m)
         if target is None:
             return 0.0, 0.0, 0.0
         if target.yaw_rad is not None:
@@ -363,6 +397,11 @@ class Vehicle:
                 port.send(messages)
             self._injector.send(m for m in messages if isinstance(m, StatusText))
 
+    def _landed_state(self) -> LandedState:
+        if not self._memory.airborne:
+            return LandedState.ON_GROUND
+        return LandedState.LANDING if self._memory.landing else LandedState.IN_AIR
+
     def _build(self, build: Callable[[Snapshot], Message | None]) -> Message | None:
         return build(self._snapshot())
 
@@ -385,6 +424,8 @@ class Vehicle:
             innovation=self._innovation,
             escs=esc_telemetry(self._pwm, self._failures.active.escs, self._battery, now_s),
             sticks=self._piloting.sticks,
+            flies=self._drive.airframe.flight is not None,
+            landed=self._landed_state(),
         )
 
     def _fence(self) -> FenceStatus | None:

@@ -6,6 +6,7 @@ from hil.airframe.model import Airframe, Battery, Motor
 # 17 kg, 2.0 m/s, 270 Wh); track 0.376 m and wheelbase 0.262 m from its robot description.
 _MASS_KG, _HALF_TRACK_M, _WHEELBASE_M = 17.0, 0.188, 0.262
 _GRIP = 0.7  # rubber on dry ground
+_SCRUB = 0.4  # of tyres that roll while they slide: lower
 _WEIGHT_N = 166.7
 
 
@@ -20,7 +21,7 @@ SKID_STEER = Airframe(
     yaw_inertia_kgm2=_MASS_KG * (0.508**2 + 0.430**2) / 12.0,  # a box
     rolling_resistance=0.06,
     # wheels scrub sideways in a turn: M = mu W L / 4 (Wong, Theory of Ground Vehicles, ch. 6)
-    yaw_resistance_nm=_GRIP * _WEIGHT_N * _WHEELBASE_M / 4.0,
+    yaw_resistance_nm=_SCRUB * _WEIGHT_N * _WHEELBASE_M / 4.0,
     speed_limit_mps=1.5,
     motors=(_side(-_HALF_TRACK_M), _side(_HALF_TRACK_M)),  # left, right
     steering="skid",
