@@ -15,7 +15,8 @@ REALITY = ("/plane/**", "/fleet", "/trail", "/setpoint", "/truth/**")
 TWINS, PLAN = "/twins/**", "/plan/**"
 PREDICTED = ("/plane/**", "- /plane/legend/**", "/fleet", PLAN)
 DARK, GRID = (14, 16, 20), (255, 255, 255, 12)
-SHORT_S, TUBE_S, CONTACT_S, WHOLE_S = 15.0, 4.0, 3.0, 24 * 3600.0
+SHORT_S, CLOSE_TRAIL_S, TUBE_S, CONTACT_S, WHOLE_S = 15.0, 5.0, 1.5, 3.0, 24 * 3600.0
+CLOSE_M = 2.9  # height of the eye that follows the suspect
 EYE_HEIGHTS = 1.04  # height of the eye, over the side of what it sees
 ASPECT = 1.7  # width of a view of the plane, over its height
 MOTOR_TABS = 6  # vehicles whose motors get a plot
@@ -41,25 +42,23 @@ def blueprint(view: StationView) -> Any:
 
 
 def _overview(view: StationView) -> Any:
-    plane = _plane(view, "Plane", (*REALITY, TWINS), SHORT_S, aspect=2.1)
+    plane = _plane(view, "Plane", (*REALITY, TWINS), SHORT_S, aspect=2.0)
     left = rrb.Vertical(plane, _phases(), row_shares=[5, 3])
     right = rrb.Vertical(
-        _posterior(), _alarm("north"), _alarm("east"), _events(), row_shares=[4, 3, 3, 5]
+        _close_up(view), _posterior(legend=True), _alarms(), row_shares=[11, 7, 6]
     )
-    return rrb.Horizontal(left, right, column_shares=[3, 2], name="Overview")
+    return rrb.Horizontal(left, right, column_shares=[4, 3], name="Overview")
 
 
 def _diagnosis(view: StationView) -> Any:
-    plane = _plane(view, "Reality and twins", (*REALITY, TWINS, PLAN), SHORT_S)
-    behind = _plot("Evidence lost to the best (nats; -4.6 is 1 : 100)", "/belief/behind_best")
+    left = rrb.Vertical(_close_up(view, PLAN), _phases(), row_shares=[5, 3])
     right = rrb.Vertical(
         _posterior(legend=True),
-        behind,
+        _plot("Evidence lost to the best (nats; -4.6 is 1 : 100)", "/belief/behind_best"),
         rrb.Horizontal(_alarm("north"), _alarm("east")),
         rrb.Horizontal(_residual("north"), _residual("east")),
         row_shares=[4, 3, 2, 2],
     )
-    left = rrb.Vertical(plane, _phases(), row_shares=[5, 3])
     return rrb.Horizontal(left, right, name="Diagnosis")
 
 
@@ -104,6 +103,27 @@ def _plane(
     trail_s: float = 0.0,
     aspect: float = ASPECT,
 ) -> Any:
+    eye = _eye(view.arena, aspect, margins=0.0 if contents is PREDICTED else MARGIN)
+    title = f"{name} (seen from above, north up, 1 m grid)"
+    return _space(view, title, contents, eye, trail_s)
+
+
+def _close_up(view: StationView, *also: str) -> Any:
+    """Follows the suspect: here one sees contacts, and twins part."""
+    contents = (*REALITY, "- /plane/legend/**", TWINS, "/focus", *also)
+    eye = rrb.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital,
+        position=(0.0, 0.0, CLOSE_M),
+        look_target=(0.0, 0.0, 0.0),
+        eye_up=(0.0, 1.0, 0.0),
+        tracking_entity="/focus",
+    )
+    return _space(view, "Close up, on the suspect (1 m grid)", contents, eye, CLOSE_TRAIL_S)
+
+
+def _space(
+    view: StationView, title: str, contents: Sequence[str], eye: Any, trail_s: float
+) -> Any:
     shown_s = {"/trail": trail_s, "/truth/trail": trail_s}
     if TWINS in contents:
         shown_s |= {f"/twins/{h}/trail": trail_s for h in hypotheses(view)}
@@ -112,10 +132,10 @@ def _plane(
     return rrb.Spatial3DView(
         origin="/",
         contents=list(contents),
-        name=f"{name} (seen from above, north up, 1 m grid)",
+        name=title,
         background=DARK,
         line_grid=rrb.LineGrid3D(visible=True, spacing=1.0, stroke_width=1.0, color=GRID),
-        eye_controls=_eye(view.arena, aspect, margins=0.0 if contents is PREDICTED else MARGIN),
+        eye_controls=eye,
         overrides={path: _last(seconds) for path, seconds in shown_s.items()},
     )
 
@@ -148,6 +168,10 @@ def _posterior(legend: bool = False) -> Any:
 
 def _alarm(axis: str) -> Any:
     return _plot(f"Alarm statistic {axis} (σ)", (f"/alarm/{axis}", "/alarm/threshold"))
+
+
+def _alarms() -> Any:
+    return _plot("Alarm statistic, north and east (σ)", "/alarm/**")
 
 
 def _residual(axis: str) -> Any:

@@ -10,6 +10,7 @@ import rerun as rr
 from numpy.typing import ArrayLike, NDArray
 
 SIM_TIME, WALL_TIME, TRAINING_STEPS = "sim_time", "wall_time", "training_steps"
+RING_M = 0.001  # height of a ring
 MAX_TICKS = 50  # kept back at most, however fast the simulation runs
 
 
@@ -35,12 +36,18 @@ def _segments(flat: NDArray[np.float64]) -> Any:
     )
 
 
+def _rings(flat: NDArray[np.float64]) -> Any:
+    lengths = np.full(len(flat), RING_M)
+    return rr.Cylinders3D.columns(centers=flat[:, :3], radii=flat[:, 3], lengths=lengths)
+
+
 SCALARS = Kind(1, lambda flat: rr.Scalars.columns(scalars=flat[:, 0]))
 BODIES = Kind(6, _bodies)  # centre, nose
 SEGMENTS = Kind(7, _segments)  # both ends, colour as 0xRRGGBBAA
 ARROWS = Kind(6, lambda flat: rr.Arrows3D.columns(origins=flat[:, :3], vectors=flat[:, 3:]))
-RINGS = Kind(3, lambda flat: rr.Cylinders3D.columns(centers=flat))
+RINGS = Kind(4, _rings)  # centre, radius; with static radii an empty row would still show a ring
 SPOTS = Kind(6, lambda flat: rr.Ellipsoids3D.columns(centers=flat[:, :3], half_sizes=flat[:, 3:]))
+POINTS = Kind(3, lambda flat: rr.Points3D.columns(positions=flat))
 GEO_POINTS = Kind(2, lambda flat: rr.GeoPoints.columns(positions=flat))  # degrees
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import rerun as rr
 
 from base_station.hypotheses import candidates
+from base_station.recording.columns import RING_M
 from base_station.recording.palette import (
     BLACK,
     DIM,
@@ -28,7 +29,7 @@ from hil.frames import ned_to_wgs84
 from hil.scenario import Arena, StationView
 
 GROUND_Z_M, TRUTH_Z_M, TWIN_Z_M, REPORT_Z_M, PLAN_Z_M, ARROW_Z_M = 0.0, 0.03, 0.05, 0.06, 0.07, 0.1
-DISC_M, RING_M = 0.02, 0.001  # heights
+DISC_M = 0.02  # height
 PER_VEHICLE = (
     *("residual/north", "residual/east", "alarm/north", "alarm/east"),
     *("speed", "goal_distance", "battery", "satellites"),
@@ -95,14 +96,16 @@ def style_belief(stream: Any, names: Sequence[str]) -> None:
         stream.log(f"/belief/{quantity}", lines, static=True)
 
 
-def style_twin(stream: Any, name: str, radii_m: Sequence[float]) -> None:
+def style_twin(stream: Any, name: str) -> None:
     """Rings where the fleet would be, spots where it would report to be."""
     color, root = hypothesis_color(name), f"/twins/{name}"
     ring = rr.Cylinders3D.from_fields(
-        radii=radii_m, lengths=RING_M, colors=color, fill_mode="majorwireframe", line_radii=0.025
+        colors=color, fill_mode="majorwireframe", line_radii=0.02
     )
     stream.log(f"{root}/body", ring, static=True)
-    spot = rr.Ellipsoids3D.from_fields(colors=color, fill_mode="solid")
+    spot = rr.Ellipsoids3D.from_fields(
+        colors=color, fill_mode="majorwireframe", line_radii=0.01
+    )
     stream.log(f"{root}/report", spot, static=True)
     stream.log(f"{root}/trail", rr.LineStrips3D.from_fields(radii=0.02), static=True)
 
@@ -114,6 +117,7 @@ def _style_fleet(stream: Any, view: StationView) -> None:
     style_bodies(stream, "/fleet", radii_m, colors, solid=True)
     stream.log("/setpoint", rr.Arrows3D.from_fields(colors=WHITE, radii=0.03), static=True)
     stream.log("/trail", rr.LineStrips3D.from_fields(radii=0.02), static=True)
+    stream.log("/focus", rr.Points3D.from_fields(radii=0.001), static=True)
     stream.log("/map/fleet", rr.GeoPoints.from_fields(colors=colors, radii=-5.0), static=True)
     for quantity in PER_VEHICLE:
         stream.log(f"/{quantity}", _lines(names, colors, 1.5), static=True)

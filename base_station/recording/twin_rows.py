@@ -41,7 +41,7 @@ class TwinRows:
             self._order += new
             scene.style_belief(self._stream, self._order)
         for twin in twins:
-            self._ghosts(twin)
+            self._ghosts(twin, doubted=len(twins) > 1)
         if twins:
             self._belief(twins)
 
@@ -60,33 +60,34 @@ class TwinRows:
         row = [values.get(name, np.nan) for name in self._order]
         self._batch.add(f"/belief/{quantity}", col.SCALARS, row)
 
-    def _ghosts(self, twin: TwinSnapshot) -> None:
+    def _ghosts(self, twin: TwinSnapshot, doubted: bool) -> None:
         name, root = twin.hypothesis, f"/twins/{twin.hypothesis}"
         if not (np.isfinite(twin.true_m).all() and np.isfinite(twin.report_m).all()):
             return
         if name not in self._styled:
             self._styled.add(name)
-            scene.style_twin(self._stream, name, self._radii_m)
+            scene.style_twin(self._stream, name)
         bodies = [scene.at(n, e, scene.TWIN_Z_M) for n, e in twin.true_m.tolist()]
-        self._batch.add(f"{root}/body", col.RINGS, bodies)
-        self._batch.add(f"{root}/report", col.SPOTS, _spots(twin))
+        rings = [(*place, radius_m) for place, radius_m in zip(bodies, self._radii_m, strict=True)]
+        self._batch.add(f"{root}/body", col.RINGS, rings)
+        self._batch.add(f"{root}/report", col.SPOTS, _spots(twin, doubted))
         color = hypothesis_color(name)
         steps = [self._trails.step((name, k), place, color) for k, place in enumerate(bodies)]
         if moved := [step for step in steps if step]:
             self._batch.add(f"{root}/trail", col.SEGMENTS, moved)
 
 
-def _spots(twin: TwinSnapshot) -> list[tuple[float, ...]]:
-    """Where the station would receive a vehicle to be, give or take."""
+def _spots(twin: TwinSnapshot, doubted: bool) -> list[tuple[float, ...]]:
+    """Where the station would receive a vehicle to be, give or take while that is in doubt."""
     spots: list[tuple[float, ...]] = []
     rows = zip(twin.true_m.tolist(), twin.report_m.tolist(), twin.sigma_m.tolist(), strict=True)
     for (true_n, true_e), (north, east), (sigma_n, sigma_e) in rows:
         elsewhere = abs(north - true_n) + abs(east - true_e) > ELSEWHERE_M
-        if elsewhere or sigma_n > 0.0 or sigma_e > 0.0:
-            half = scene.at(_half_m(sigma_n), _half_m(sigma_e), scene.RING_M)
+        if elsewhere or (doubted and (sigma_n > 0.0 or sigma_e > 0.0)):
+            half = scene.at(_half_m(sigma_n, doubted), _half_m(sigma_e, doubted), col.RING_M)
             spots.append((*scene.at(north, east, scene.REPORT_Z_M), *half))
     return spots
 
 
-def _half_m(sigma_m: float) -> float:
-    return max(MIN_SPOT_M, SIGMAS * sigma_m)  # the order also turns NaN into the minimum
+def _half_m(sigma_m: float, doubted: bool) -> float:
+    return max(MIN_SPOT_M, SIGMAS * sigma_m if doubted else 0.0)  # NaN becomes the minimum, too
