@@ -16,7 +16,6 @@ TWINS, PLAN = "/twins/**", "/plan/**"
 PREDICTED = ("/plane/**", "- /plane/legend/**", "/fleet", PLAN)
 DARK, GRID = (14, 16, 20), (255, 255, 255, 12)
 SHORT_S, CLOSE_TRAIL_S, TUBE_S, CONTACT_S, WHOLE_S = 15.0, 5.0, 1.5, 3.0, 24 * 3600.0
-CLOSE_M = 2.9  # height of the eye that follows the suspect
 EYE_HEIGHTS = 1.04  # height of the eye, over the side of what it sees
 ASPECT = 1.7  # width of a view of the plane, over its height
 MOTOR_TABS = 6  # vehicles whose motors get a plot
@@ -45,7 +44,7 @@ def _overview(view: StationView) -> Any:
     plane = _plane(view, "Plane", (*REALITY, TWINS), SHORT_S, aspect=2.0)
     left = rrb.Vertical(plane, _phases(), row_shares=[5, 3])
     right = rrb.Vertical(
-        _close_up(view), _posterior(legend=True), _alarms(), row_shares=[11, 7, 6]
+        _close_up(view), _posterior(), _alarms(), row_shares=[11, 7, 6]
     )
     return rrb.Horizontal(left, right, column_shares=[4, 3], name="Overview")
 
@@ -111,13 +110,7 @@ def _plane(
 def _close_up(view: StationView, *also: str) -> Any:
     """Follows the suspect: here one sees contacts, and twins part."""
     contents = (*REALITY, "- /plane/legend/**", TWINS, "/focus", *also)
-    eye = rrb.EyeControls3D(
-        kind=rrb.Eye3DKind.Orbital,
-        position=(0.0, 0.0, CLOSE_M),
-        look_target=(0.0, 0.0, 0.0),
-        eye_up=(0.0, 1.0, 0.0),
-        tracking_entity="/focus",
-    )
+    eye = rrb.EyeControls3D(tracking_entity="/focus")
     return _space(view, "Close up, on the suspect (1 m grid)", contents, eye, CLOSE_TRAIL_S)
 
 

@@ -41,13 +41,19 @@ def _rings(flat: NDArray[np.float64]) -> Any:
     return rr.Cylinders3D.columns(centers=flat[:, :3], radii=flat[:, 3], lengths=lengths)
 
 
+def _cameras(flat: NDArray[np.float64]) -> Any:
+    """Above what they show, looking down, north up: half a turn about the axis to the east."""
+    half_turns = np.tile((1.0, 0.0, 0.0, 0.0), (len(flat), 1))
+    return rr.Transform3D.columns(translation=flat, quaternion=half_turns)
+
+
 SCALARS = Kind(1, lambda flat: rr.Scalars.columns(scalars=flat[:, 0]))
 BODIES = Kind(6, _bodies)  # centre, nose
 SEGMENTS = Kind(7, _segments)  # both ends, colour as 0xRRGGBBAA
 ARROWS = Kind(6, lambda flat: rr.Arrows3D.columns(origins=flat[:, :3], vectors=flat[:, 3:]))
 RINGS = Kind(4, _rings)  # centre, radius; with static radii an empty row would still show a ring
 SPOTS = Kind(6, lambda flat: rr.Ellipsoids3D.columns(centers=flat[:, :3], half_sizes=flat[:, 3:]))
-POINTS = Kind(3, lambda flat: rr.Points3D.columns(positions=flat))
+CAMERAS = Kind(3, _cameras)
 GEO_POINTS = Kind(2, lambda flat: rr.GeoPoints.columns(positions=flat))  # degrees
 
 

@@ -45,14 +45,14 @@ class FleetRows:
             self._slow(snapshot)
         if all(known(*v.reported_m) for v in vehicles):  # colours go by place in the fleet
             self._places(vehicles, slow)
-            self._batch.add("/focus", col.POINTS, self._focus(vehicles))
+            self._batch.add("/focus", col.CAMERAS, self._focus(vehicles))
 
     def _focus(self, vehicles: Sequence[VehicleSnapshot]) -> scene.Point3:
         """What a close-up follows: whoever is or was the suspect, else the middle of the fleet."""
         self._suspect = next((v.sysid for v in vehicles if v.phase == "suspect"), self._suspect)
         shown = [v for v in vehicles if self._suspect in (None, v.sysid)]
         norths_m, easts_m = zip(*(v.reported_m for v in shown), strict=True)
-        return scene.at(sum(norths_m) / len(shown), sum(easts_m) / len(shown))
+        return scene.at(sum(norths_m) / len(shown), sum(easts_m) / len(shown), scene.CLOSE_M)
 
     def _slow(self, snapshot: Snapshot) -> None:
         self._series("battery", snapshot.vehicles, lambda v: v.battery_percent)

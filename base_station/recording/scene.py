@@ -30,6 +30,7 @@ from hil.scenario import Arena, StationView
 
 GROUND_Z_M, TRUTH_Z_M, TWIN_Z_M, REPORT_Z_M, PLAN_Z_M, ARROW_Z_M = 0.0, 0.03, 0.05, 0.06, 0.07, 0.1
 DISC_M = 0.02  # height
+CLOSE_M, CLOSE_FOV_RAD = 3.4, 0.96  # the camera of the close-up: height above the plane, opening
 PER_VEHICLE = (
     *("residual/north", "residual/east", "alarm/north", "alarm/east"),
     *("speed", "goal_distance", "battery", "satellites"),
@@ -117,12 +118,20 @@ def _style_fleet(stream: Any, view: StationView) -> None:
     style_bodies(stream, "/fleet", radii_m, colors, solid=True)
     stream.log("/setpoint", rr.Arrows3D.from_fields(colors=WHITE, radii=0.03), static=True)
     stream.log("/trail", rr.LineStrips3D.from_fields(radii=0.02), static=True)
-    stream.log("/focus", rr.Points3D.from_fields(radii=0.001), static=True)
+    _log_camera(stream)
     stream.log("/map/fleet", rr.GeoPoints.from_fields(colors=colors, radii=-5.0), static=True)
     for quantity in PER_VEHICLE:
         stream.log(f"/{quantity}", _lines(names, colors, 1.5), static=True)
     for member in view.fleet:
         stream.log(f"/motors/{member.name}", _motor_lines(member.frame), static=True)
+
+
+def _log_camera(stream: Any) -> None:
+    """Looks down on whatever a close-up follows, north up."""
+    view = rr.Pinhole(
+        fov_y=CLOSE_FOV_RAD, aspect_ratio=1.6, image_plane_distance=0.01, color=(0, 0, 0, 0)
+    )
+    stream.log("/focus", view, static=True)
 
 
 def _log_goals(stream: Any, view: StationView) -> None:

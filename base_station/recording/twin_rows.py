@@ -28,15 +28,15 @@ class TwinRows:
         self._order = scene.hypotheses(view)
         self._trails = Trails()
         self._styled: set[str] = set()
-        self.shown: tuple[str, ...] = ()
+        self._shown: tuple[TwinSnapshot, ...] = ()
 
     def add(self, twins: Sequence[TwinSnapshot]) -> None:
         names = tuple(t.hypothesis for t in twins)
-        for gone in sorted(set(self.shown) - set(names)):
+        for gone in sorted({t.hypothesis for t in self._shown} - set(names)):
             self._batch.add(f"/twins/{gone}/body", col.RINGS, ())
             self._batch.add(f"/twins/{gone}/report", col.SPOTS, ())
             self._trails.forget(gone)
-        self.shown = names
+        self._shown = tuple(twins)
         if new := tuple(name for name in names if name not in self._order):
             self._order += new
             scene.style_belief(self._stream, self._order)
@@ -44,6 +44,12 @@ class TwinRows:
             self._ghosts(twin, doubted=len(twins) > 1)
         if twins:
             self._belief(twins)
+
+    def likeliest(self, count: int) -> tuple[str, ...]:
+        """The hypotheses most believed in, in the order of the twins: those a plan is made for."""
+        ranked = sorted(self._shown, key=lambda t: -t.posterior)
+        likely = {t.hypothesis for t in ranked[:count]}
+        return tuple(t.hypothesis for t in self._shown if t.hypothesis in likely)
 
     def _belief(self, twins: Sequence[TwinSnapshot]) -> None:
         best = max(t.log_likelihood for t in twins)

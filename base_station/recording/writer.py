@@ -63,7 +63,8 @@ class Writer:
 
     def plan(self, ready: PlanReady) -> None:
         set_time(self._stream, self._now_s)
-        self._learning.plan(ready, self._twins.shown)
+        twins = len(ready.plan.predicted_reports) if ready.plan else 0
+        self._learning.plan(ready, self._twins.likeliest(twins))
 
     def close(self) -> None:
         """Everything kept back goes out, and the stream ends."""
