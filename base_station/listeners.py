@@ -96,7 +96,7 @@ def open_listeners(
     folder: Path,
     run_id: str,
     view: StationView,
-    viewer: bool,
+    viewer: str | None,
     say: Callable[[dict[str, Any]], None],
 ) -> list[Listener]:
     """Everything that listens to a station: telemetry logs, events, recording, lines.

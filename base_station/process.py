@@ -19,6 +19,7 @@ from base_station.execution import hold
 from base_station.listeners import open_listeners
 from base_station.node import StationNode
 from base_station.planner_child import PlannerChild
+from base_station.recording.streams import VIEWER
 from base_station.telemetry import Frame
 from base_station.watch import Baseline, Watch
 from hil.errors import HilError, InputError
@@ -54,7 +55,11 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--out", type=Path, default=Path("."), help="where logs are written")
     parser.add_argument("--machine", action="store_true", help="JSON lines instead of text")
     parser.add_argument(
-        "--viewer", action="store_true", help="stream to a Rerun viewer, if one runs"
+        "--viewer",
+        nargs="?",
+        const=VIEWER,
+        metavar="HOST:PORT",
+        help=f"stream to the Rerun viewer there, if one runs; without an address {VIEWER}",
     )
     parser.add_argument("--run-id", default=None, help="recording id, to share one recording")
     return parser.parse_args()

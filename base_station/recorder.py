@@ -21,17 +21,16 @@ from hil.scenario import StationView
 class Recorder:
     """Writes `path` and, where asked and one answers, feeds a viewer.
 
-    `viewer` is True for a viewer on this machine, or its address as host:port. Recordings of one
-    `run_id` are one recording, whoever writes them.
+    `viewer` is its address as host:port. Recordings of one `run_id` are one recording, whoever
+    writes them.
     """
 
     def __init__(
-        self, path: Path, run_id: str, view: StationView, viewer: bool | str = False
+        self, path: Path, run_id: str, view: StationView, viewer: str | None = None
     ) -> None:
         self._channels = [Channel(Inline(), partial(_file_writer, path, run_id, view))]
         if viewer:
-            address = streams.VIEWER if viewer is True else viewer
-            self._channels.append(Channel(Queued(), partial(_viewer_writer, address, run_id, view)))
+            self._channels.append(Channel(Queued(), partial(_viewer_writer, viewer, run_id, view)))
 
     @property
     def failures(self) -> int:

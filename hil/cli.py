@@ -55,8 +55,22 @@ def _run(options: argparse.Namespace) -> int:
             speed=options.speed,
             in_memory=options.in_memory,
             viewer=options.viewer,
+            serve=options.serve,
         ),
     )
+
+
+def _view(options: argparse.Namespace) -> int:
+    from hil.bench.viewers import view
+
+    return view(options.run, options.web)
+
+
+def _shot(options: argparse.Namespace) -> int:
+    from hil.bench.viewers import shoot
+
+    shoot(options.run, options.at, options.out, options.view)
+    return 0
 
 
 def _check(options: argparse.Namespace) -> int:
@@ -139,15 +153,31 @@ def _parser() -> argparse.ArgumentParser:
         default=False,
         help="open the Rerun viewer and stream to it",
     )
+    run.add_argument("--serve", action="store_true", help="offer a web viewer on this machine")
     run.set_defaults(command=_run)
+
+    recorded = _Parser(add_help=False)
+    recorded.add_argument("run", type=Path, metavar="RUN", help="a run's folder, or an .rrd file")
+
+    view = commands.add_parser("view", parents=[recorded], help="open a run in the Rerun viewer")
+    view.add_argument("--web", action="store_true", help="in a browser")
+    view.set_defaults(command=_view)
+
+    shot = commands.add_parser(
+        "shot", parents=[recorded], help="a picture of a run, as a viewer shows it"
+    )
+    shot.add_argument("--at", type=float, required=True, metavar="T", help="simulation time (s)")
+    shot.add_argument("--view", metavar="NAME", help="a tab, or a view by its title's beginning")
+    shot.add_argument("-o", "--out", type=Path, required=True, metavar="PNG")
+    shot.set_defaults(command=_shot)
 
     check = commands.add_parser("check", parents=[scenario], help="validate a scenario")
     check.set_defaults(command=_check)
 
-    view = commands.add_parser(
+    told = commands.add_parser(
         "station-view", parents=[scenario], help="print what the base station is told"
     )
-    view.set_defaults(command=_station_view)
+    told.set_defaults(command=_station_view)
 
     schema = commands.add_parser("schema", help="print the JSON schema of scenarios")
     schema.set_defaults(command=_schema)

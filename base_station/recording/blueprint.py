@@ -43,9 +43,7 @@ def blueprint(view: StationView) -> Any:
 def _overview(view: StationView) -> Any:
     plane = _plane(view, "Plane", (*REALITY, TWINS), SHORT_S, aspect=2.0)
     left = rrb.Vertical(plane, _phases(), row_shares=[5, 3])
-    right = rrb.Vertical(
-        _close_up(view), _posterior(), _alarms(), row_shares=[11, 7, 6]
-    )
+    right = rrb.Vertical(_close_up(view), _posterior(), _alarms(), row_shares=[11, 7, 6])
     return rrb.Horizontal(left, right, column_shares=[4, 3], name="Overview")
 
 
@@ -114,9 +112,7 @@ def _close_up(view: StationView, *also: str) -> Any:
     return _space(view, "Close up, on the suspect (1 m grid)", contents, eye, CLOSE_TRAIL_S)
 
 
-def _space(
-    view: StationView, title: str, contents: Sequence[str], eye: Any, trail_s: float
-) -> Any:
+def _space(view: StationView, title: str, contents: Sequence[str], eye: Any, trail_s: float) -> Any:
     shown_s = {"/trail": trail_s, "/truth/trail": trail_s}
     if TWINS in contents:
         shown_s |= {f"/twins/{h}/trail": trail_s for h in hypotheses(view)}

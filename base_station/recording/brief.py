@@ -15,7 +15,7 @@ LEGEND = """\
 | filled disc with a nose | where a vehicle **reports** to be, and its heading |
 | white ring | where it **truly** is; the station never sees this (root `truth`) |
 | coloured ring | where it would be **if that hypothesis were right**: its twin |
-| coloured spot | what the station would then **receive**, two standard deviations wide |
+| coloured ellipse | what the station would then **receive**, two standard deviations wide |
 | white arrow | where its orders would take it in 2 s |
 | circle with a dot | goal, and how near counts as reached |
 

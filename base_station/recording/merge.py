@@ -3,11 +3,11 @@
 import logging
 import shutil
 import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-TOOL = [sys.executable, "-m", "rerun"]
+from base_station.recording.binary import rerun
+
 TIMEOUT_S = 120.0
 
 log = logging.getLogger(__name__)
@@ -32,7 +32,7 @@ def merge(parts: Sequence[Path], out: Path) -> None:
 
 
 def _rrd(*arguments: str) -> bool:
-    command = [*TOOL, "rrd", *arguments]
+    command = rerun("rrd", *arguments)
     try:
         done = subprocess.run(command, capture_output=True, timeout=TIMEOUT_S, check=False)
     except (OSError, subprocess.TimeoutExpired):

@@ -100,13 +100,9 @@ def style_belief(stream: Any, names: Sequence[str]) -> None:
 def style_twin(stream: Any, name: str) -> None:
     """Rings where the fleet would be, spots where it would report to be."""
     color, root = hypothesis_color(name), f"/twins/{name}"
-    ring = rr.Cylinders3D.from_fields(
-        colors=color, fill_mode="majorwireframe", line_radii=0.02
-    )
+    ring = rr.Cylinders3D.from_fields(colors=color, fill_mode="majorwireframe", line_radii=0.02)
     stream.log(f"{root}/body", ring, static=True)
-    spot = rr.Ellipsoids3D.from_fields(
-        colors=color, fill_mode="majorwireframe", line_radii=0.01
-    )
+    spot = rr.Ellipsoids3D.from_fields(colors=color, fill_mode="majorwireframe", line_radii=0.01)
     stream.log(f"{root}/report", spot, static=True)
     stream.log(f"{root}/trail", rr.LineStrips3D.from_fields(radii=0.02), static=True)
 

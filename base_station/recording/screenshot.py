@@ -10,10 +10,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import rerun_cli
 from PIL import Image
 from rerun.experimental import ViewerClient
 
+from base_station.recording.binary import rerun
 from base_station.recording.blueprint import TABS
 from base_station.recording.columns import SIM_TIME
 from hil.errors import HilError, InputError
@@ -38,7 +38,7 @@ def headless(rrd: Path | None = None) -> Iterator["Viewer"]:
     """A headless viewer, with a recording open. Needs a Vulkan driver (`mesa-vulkan-drivers`)."""
     port = _free_port()
     width, height = SIZE[0], SIZE[1] + MENU
-    command = [str(Path(rerun_cli.__file__).parent / "rerun"), "--headless", "--bind", "127.0.0.1"]
+    command = rerun("--headless", "--bind", "127.0.0.1")
     command += ["--port", str(port), "--window-size", f"{width}x{height}"]
     command += ["--hide-welcome-screen", "--memory-limit", "2GiB"]
     process = subprocess.Popen(
@@ -151,13 +151,13 @@ class _Layout:
 
 
 def _cropped(png: bytes) -> bytes:
-    """Without the menu bar, and with few colours: a fifth of the size, and nobody sees it."""
+    """Without the menu bar."""
     with Image.open(io.BytesIO(png)) as image:
         width, height = image.size
         part = image.convert("RGB").crop((0, MENU, width, height))
-    small = io.BytesIO()
-    part.quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(small, "PNG", optimize=True)
-    return small.getvalue()
+    cropped = io.BytesIO()
+    part.save(cropped, "PNG", optimize=True)
+    return cropped.getvalue()
 
 
 def _connect(process: subprocess.Popen[bytes], port: int) -> Any:

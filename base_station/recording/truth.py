@@ -26,13 +26,12 @@ class TruthRecorder:
     """Never raises and never waits for a viewer. NED in m and rad, N s, world time in s."""
 
     def __init__(
-        self, path: Path, run_id: str, scenario: Scenario, viewer: bool | str = False
+        self, path: Path, run_id: str, scenario: Scenario, viewer: str | None = None
     ) -> None:
         self._channels = [Channel(Inline(), partial(_file_writer, path, run_id, scenario))]
         if viewer:
-            address = streams.VIEWER if viewer is True else viewer
             self._channels.append(
-                Channel(Queued(), partial(_viewer_writer, address, run_id, scenario))
+                Channel(Queued(), partial(_viewer_writer, viewer, run_id, scenario))
             )
 
     @property

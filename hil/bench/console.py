@@ -122,8 +122,8 @@ class Console:
         self._live.stop()
         self._out.print(summary(tree, scenario))
         if recording is not None:
-            line = Text("  replay it   ", style="dim").append(
-                f"rerun {recording}", style="bold cyan"
+            line = Text("  look at it  ", style="dim").append(
+                f"hil view {recording.parent}", style="bold cyan"
             )
             self._out.print(line, soft_wrap=True)
 

@@ -17,7 +17,12 @@ GIVE_UP_S = 1800.0  # simulation time; every phase of the station ends long befo
 
 
 def run_in_memory(
-    scenario: Scenario, folder: Path, run_id: str, viewer: bool, log: RunLog, onsets: Onsets
+    scenario: Scenario,
+    folder: Path,
+    run_id: str,
+    viewer: str | None,
+    log: RunLog,
+    onsets: Onsets,
 ) -> None:
     """Until the station has concluded. Raises InputError for a refused fault, ProcessDiedError."""
     with ExitStack() as stack:

@@ -3,10 +3,6 @@
 Rerun itself is used in `base_station.recording` only, and imported when it is needed.
 """
 
-import socket
-import subprocess
-import sys
-import time
 from pathlib import Path
 from typing import Protocol
 
@@ -15,7 +11,6 @@ from hil.scenario import Scenario
 from hil.world.truth import ContactEpisode, TruthRecord
 
 STATION_RECORDING, TRUTH_RECORDING, RECORDING = "station.rrd", "truth.rrd", "mission.rrd"
-VIEWER_WITHIN_S = 15.0
 
 
 class TruthObserver(Protocol):
@@ -33,7 +28,7 @@ class TruthObserver(Protocol):
 class RecordedTruth:
     """Hands the truth to the recorder, in the recording that the station writes, too."""
 
-    def __init__(self, folders: Folders, scenario: Scenario, viewer: bool) -> None:
+    def __init__(self, folders: Folders, scenario: Scenario, viewer: str | None) -> None:
         from base_station.recording.truth import TruthRecorder
 
         path = folders.run / TRUTH_RECORDING
@@ -66,33 +61,3 @@ def merge_recordings(folder: Path) -> Path | None:
     for part in parts:
         part.unlink(missing_ok=True)
     return target
-
-
-def open_viewer() -> bool:
-    """Start a Rerun viewer unless one runs; whether one listens. It stays after the run."""
-    from base_station.recording.streams import VIEWER
-
-    if _listens(VIEWER):
-        return True
-    subprocess.Popen(
-        [sys.executable, "-m", "rerun", "--bind", "127.0.0.1", "--port", VIEWER.split(":")[1]],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
-    deadline_s = time.monotonic() + VIEWER_WITHIN_S
-    while time.monotonic() < deadline_s:
-        if _listens(VIEWER):
-            return True
-        time.sleep(0.1)
-    return False
-
-
-def _listens(address: str) -> bool:
-    host, port = address.split(":")
-    try:
-        socket.create_connection((host, int(port)), timeout=0.3).close()
-    except OSError:
-        return False
-    return True

@@ -2,7 +2,7 @@
 
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
@@ -19,11 +19,12 @@ from hil.bench.folders import (
 from hil.bench.onsets import Onsets
 from hil.bench.ports import choose_ports
 from hil.bench.record import RunRecord
-from hil.bench.recording import RecordedTruth, merge_recordings, open_viewer
+from hil.bench.recording import RecordedTruth, merge_recordings
 from hil.bench.result import COMPLETED, result_tree, write_result
 from hil.bench.runlog import RunLog
 from hil.bench.score import score
 from hil.bench.udp import Programs, UdpOptions, run_over_udp
+from hil.bench.viewers import Viewer, live_viewer, until_interrupted
 from hil.errors import EXIT_AS_EXPECTED, EXIT_NOT_AS_EXPECTED, HilError
 from hil.scenario import Scenario
 
@@ -44,6 +45,7 @@ class RunOptions:
     speed: float = 1.0
     in_memory: bool = False
     viewer: bool = False
+    serve: bool = False
     programs: Programs = field(default_factory=Programs)
 
 
@@ -57,43 +59,65 @@ def run(scenario: Scenario, options: RunOptions, console: Console | None = None)
     folders = choose_folders(scenario, options.out)
     if not options.in_memory:
         scenario = pin_ports(scenario, choose_ports(scenario))
-    with _interruptible(), console or Console() as shown:
-        create_folders(folders)
-        try:
-            write_inputs(scenario, folders)
-            shown.begin(scenario, folders.run, _how(options))
-            record, failure = _attempt(scenario, folders, options, shown, onsets)
-            met = _conclude(scenario, folders, record, failure, shown)
-        finally:
-            collect(folders)
+    with ExitStack() as stack:
+        with _interruptible(), console or Console() as shown:
+            create_folders(folders)
+            try:
+                write_inputs(scenario, folders)
+                shown.begin(scenario, folders.run, _how(options))
+                viewer = _viewer(stack, options, shown)
+                record, failure = _attempt(scenario, folders, options, viewer, shown, onsets)
+                met = _conclude(scenario, folders, record, failure, shown)
+            finally:
+                collect(folders)
+        if viewer.url:
+            until_interrupted(viewer)
     if failure is not None:
         raise failure
     return EXIT_AS_EXPECTED if met else EXIT_NOT_AS_EXPECTED
 
 
+def _viewer(stack: ExitStack, options: RunOptions, console: Console) -> Viewer:
+    viewer = live_viewer(stack, options.viewer, options.serve)
+    if viewer.url:
+        console.say(f"look at it live: {viewer.url}")
+    elif viewer.address is None and (options.viewer or options.serve):
+        console.say("no viewer starts here: recording to the file only")
+    return viewer
+
+
 def _attempt(
-    scenario: Scenario, folders: Folders, options: RunOptions, console: Console, onsets: Onsets
+    scenario: Scenario,
+    folders: Folders,
+    options: RunOptions,
+    viewer: Viewer,
+    console: Console,
+    onsets: Onsets,
 ) -> tuple[RunRecord, HilError | None]:
     """What the backend brought about, and what cut it short, if anything did."""
-    viewer = options.viewer and open_viewer()
-    truth = RecordedTruth(folders, scenario, viewer)
+    truth = RecordedTruth(folders, scenario, viewer.address)
     with RunLog(scenario, folders.run, console, truth) as log:
         try:
-            _backend(scenario, folders, options, log, onsets)
+            _backend(scenario, folders, options, viewer, log, onsets)
         except HilError as error:
             return log.record(), error
         return log.record(), None
 
 
 def _backend(
-    scenario: Scenario, folders: Folders, options: RunOptions, log: RunLog, onsets: Onsets
+    scenario: Scenario,
+    folders: Folders,
+    options: RunOptions,
+    viewer: Viewer,
+    log: RunLog,
+    onsets: Onsets,
 ) -> None:
     if options.in_memory:
         from hil.bench.memory import run_in_memory  # learns in this process: imports torch
 
-        run_in_memory(scenario, folders.station, folders.run_id, options.viewer, log, onsets)
+        run_in_memory(scenario, folders.station, folders.run_id, viewer.address, log, onsets)
         return
-    udp = UdpOptions(options.speed, options.viewer, options.programs)
+    udp = UdpOptions(options.speed, viewer.address, options.programs)
     run_over_udp(scenario, folders, udp, log, onsets)
 
 

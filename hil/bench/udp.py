@@ -36,7 +36,7 @@ class Programs:
 @dataclass(frozen=True)
 class UdpOptions:
     speed: float = 1.0
-    viewer: bool = False
+    viewer: str | None = None  # host:port
     programs: Programs = field(default_factory=Programs)
 
 
@@ -90,7 +90,7 @@ class _Run:
         for v in self._scenario.fleet:
             argv = (*programs.vehicle, scenario_file, "--sysid", str(v.sysid))
             children.start(Command(f"sim-vehicle {v.name}", argv, folder / f"{v.name}.log"))
-        viewer = ("--viewer",) if self._options.viewer else ()
+        viewer = ("--viewer", self._options.viewer) if self._options.viewer else ()
         identity = ("--run-id", self._folders.run_id)
         station = children.start(
             Command(

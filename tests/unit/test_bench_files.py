@@ -103,7 +103,7 @@ def test_what_the_station_wrote_ends_up_in_the_run(folders: Folders) -> None:
 
 def test_the_truth_becomes_part_of_the_mission(folders: Folders) -> None:
     assert merge_recordings(folders.run) is None
-    recorded = RecordedTruth(folders, rescue(), viewer=False)
+    recorded = RecordedTruth(folders, rescue(), viewer=None)
     recorded.truth(TruthRecord(1.0, {1: VehicleTruth(1.0, 2.0, 0.5, 0.0, 0.0)}))
     recorded.contact(ContactEpisode(1.0, 2.0, ("rover_1", "rover_2"), 3.0, (1.0, 2.0)))
     recorded.fault(1.0, "rover_2: motor 3 off")

@@ -106,7 +106,7 @@ def test_without_the_tool_the_largest_part_is_kept(
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    monkeypatch.setattr(merging, "TOOL", ["/nowhere/rerun"])
+    monkeypatch.setattr(merging, "rerun", lambda *_: ["/nowhere/rerun"])
     with caplog.at_level(logging.WARNING):
         merge(parts, tmp_path / "mission.rrd")
     assert (tmp_path / "mission.rrd").read_bytes() == parts[0].read_bytes()
