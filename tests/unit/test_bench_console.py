@@ -55,7 +55,7 @@ def test_plain_output_is_lines_without_control_codes() -> None:
     assert "learning alpha, attempt 1: 50 %, reward 0.5" in text
     assert text.count("learning alpha") == 4
     assert "as expected" in text
-    assert text.rstrip().endswith("rerun runs/rescue-x/mission.rrd")
+    assert text.rstrip().endswith("hil view runs/rescue-x")
 
 
 def test_a_terminal_gets_a_bar_and_the_reward() -> None:
