@@ -1,0 +1,100 @@
+"""A world with one vehicle in it, as processes; and how to watch what clients say."""
+
+import queue
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from rover_process import free_port
+
+PATIENCE_S = 30.0
+SYSID = 2
+LONE = """
+name: lone
+arena: {{north_min_m: -30.0, north_max_m: 30.0, east_min_m: -30.0, east_max_m: 30.0}}
+fleet:
+  - name: vehicle
+    sysid: {sysid}
+    airframe: {airframe}
+    start: {{north_m: 0.0, east_m: 0.0}}
+    goal: {{north_m: 1.0, east_m: 0.0}}
+"""
+
+
+@dataclass(frozen=True)
+class Ports:
+    """UDP: where the vehicle speaks to, where other stations find it, and the injector's."""
+
+    mavlink: int
+    listen: int
+    injector: int
+
+
+@contextmanager
+def lone_vehicle(folder: Path, airframe: str = "omni_plus", speed: float = 1.0) -> Iterator[Ports]:
+    scenario = folder / "lone.yaml"
+    scenario.write_text(LONE.format(sysid=SYSID, airframe=airframe))
+    physics, ports = free_port(), Ports(free_port(), free_port(), free_port())
+    world = ["hil.cli", "world", str(scenario), "--physics-port", str(physics)]
+    vehicle = ["sim_vehicles.process", str(scenario), "--sysid", str(SYSID)]
+    vehicle += ["--physics-port", str(physics), "--mavlink-port", str(ports.mavlink)]
+    vehicle += ["--listen-port", str(ports.listen), "--injector-port", str(ports.injector)]
+    with ExitStack() as stack:
+        for words in ([*world, "--speed", str(speed)], vehicle):
+            process = subprocess.Popen(
+                [sys.executable, "-m", *words], stdout=subprocess.PIPE, text=True
+            )
+            stack.callback(process.communicate)
+            stack.callback(process.kill)
+            assert process.stdout is not None
+            assert process.stdout.readline() == "ready\n"
+        yield ports
+
+
+class Console:
+    """A client with a prompt: what it is told, and what it says, line by line."""
+
+    def __init__(self, command: list[str], folder: Path) -> None:
+        self.process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            bufsize=1,
+            cwd=folder,
+        )
+        self.said: list[str] = []
+        self._lines: queue.Queue[str] = queue.Queue()
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self._lines.put(line.rstrip())
+
+    def tell(self, line: str) -> None:
+        assert self.process.stdin is not None
+        self.process.stdin.write(line + "\n")
+        self.process.stdin.flush()
+
+    def expect(self, words: str) -> str:
+        """Wait for a line with these words."""
+        while True:
+            try:
+                line = self._lines.get(timeout=PATIENCE_S)
+            except queue.Empty:
+                raise AssertionError(f"no {words!r} after:\n" + "\n".join(self.said)) from None
+            self.said.append(line)
+            if words in line:
+                return line
+
+    def stop(self) -> None:
+        self.process.kill()
+        self.process.communicate()
+        while not self._lines.empty():
+            self.said.append(self._lines.get())
