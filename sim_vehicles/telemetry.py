@@ -121,7 +121,8 @@ def sys_status(s: Snapshot) -> SysStatus:
         health |= int(_WHEN_READY)
     if s.fence is not None:
         present |= int(Sensor.GEOFENCE)
-        health |= 0 if s.fence.breached else int(Sensor.GEOFENCE)
+    if s.fence is None or not s.fence.breached:
+        health |= int(Sensor.GEOFENCE)  # a fence that is switched off is healthy, too
     battery = (s.battery.voltage_v, s.battery.current_a, s.battery.remaining_percent)
     return SysStatus(present, present, health, CPU_LOAD, *battery)
 

@@ -1,0 +1,73 @@
+"""MAVProxy, as a process of its own, against a vehicle in the real world process."""
+
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from lone_vehicle import Console, Ports, lone_vehicle
+
+MAVPROXY = shutil.which("mavproxy.py", path=str(Path(sys.executable).parent))
+pytestmark = pytest.mark.skipif(MAVPROXY is None, reason="MAVProxy is not installed")
+SPEED = 3.0
+MODULES = "log,wp,rally,fence,param,arm,mode,rc,misc,cmdlong,link,output"
+TROUBLE = ("imeout", "down", "no link", "Failed", "rror", "etry", "DENIED", "UNSUPPORTED", "breach")
+WAY = """QGC WPL 110
+0 1 0 16 0 0 0 0 47.397742 8.545594 488 1
+1 0 3 16 0 0 0 0 47.397751 8.545594 0 1
+2 0 3 16 0 0 0 0 47.397742 8.545594 0 1
+"""
+
+
+def console(ports: Ports, folder: Path) -> Console:
+    """On the station's port, with its state in a folder of its own."""
+    assert MAVPROXY is not None
+    (folder / "way.txt").write_text(WAY.replace(" ", "\t").replace("QGC\tWPL\t", "QGC WPL "))
+    options = [f"--master=udpin:127.0.0.1:{ports.mavlink}", f"--default-modules={MODULES}"]
+    options += ["--source-system=245", f"--state-basedir={folder}"]
+    return Console([sys.executable, MAVPROXY, *options], folder)
+
+
+def drive(prompt: Console) -> None:
+    prompt.expect("Detected vehicle 2:1")
+    prompt.expect("Saved 40 parameters")
+    for said, heard in (
+        ("param set FS_TIMEOUT 7", None),
+        ("mode GUIDED", "Mode GUIDED"),
+        ("arm throttle", "AP: Throttle armed"),
+        (None, "ARMED"),
+        ("velocity 0.5 0 0", None),
+        ("watch VFR_HUD", "groundspeed : 0.4"),
+        ("watch", None),
+        ("wp load way.txt", "Got MISSION_ACK: TYPE_MISSION: ACCEPTED"),
+        ("wp list", "Saved waypoints to"),
+        ("wp set 1", "DO_SET_MISSION_CURRENT: ACCEPTED"),
+        ("mode AUTO", "AP: Reached waypoint #1"),
+        (None, "AP: Mission Complete"),
+        ("wp clear", "Got MISSION_ACK: TYPE_MISSION: ACCEPTED"),
+        ("mode RTL", "Mode RTL"),
+        ("mode MANUAL", "Mode MANUAL"),
+        ("rc 3 1700", None),
+        ("watch RC_CHANNELS", "chan3_raw : 1700"),
+        ("watch VFR_HUD", "throttle : 20"),
+        ("watch", None),
+        ("mode HOLD", "Mode HOLD"),
+        ("disarm", "DISARMED"),
+        ("param fetch FS_TIMEOUT", "FS_TIMEOUT = 7.0"),
+        ("fence list", "Requesting 0 fence items"),
+        ("rally list", "Requesting 0 rally items"),
+    ):
+        if said is not None:
+            prompt.tell(said)
+        if heard is not None:
+            prompt.expect(heard)
+
+
+def test_mavproxy_and_a_rover(tmp_path: Path) -> None:
+    with lone_vehicle(tmp_path, speed=SPEED) as ports:
+        prompt = console(ports, tmp_path)
+        try:
+            drive(prompt)
+        finally:
+            prompt.stop()
+    assert [line for line in prompt.said if any(word in line for word in TROUBLE)] == []
