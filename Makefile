@@ -5,6 +5,8 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed
 INSTALLED_DEV := $(VENV)/installed-dev
 TORCH := $(shell sed -n 's/^ *"\(torch==[^"]*\)".*/\1/p' pyproject.toml)
+# a client to test against; its dependencies are for maps and graphs (300 MB), which are not needed
+MAVPROXY := mavproxy>=1.8.75,<1.9
 
 .PHONY: demo install test check format clean
 
@@ -23,6 +25,7 @@ $(INSTALLED): pyproject.toml
 
 $(INSTALLED_DEV): $(INSTALLED)
 	$(BIN)/pip install --quiet --disable-pip-version-check -e ".[dev]"
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps "$(MAVPROXY)"
 	touch $@
 
 test: $(INSTALLED_DEV)

@@ -35,7 +35,10 @@ class Ports:
 
 
 @contextmanager
-def lone_vehicle(folder: Path, airframe: str = "omni_plus", speed: float = 1.0) -> Iterator[Ports]:
+def lone_vehicle(
+    folder: Path, airframe: str = "omni_plus", speed: float = 1.0, options: tuple[str, ...] = ()
+) -> Iterator[Ports]:
+    """`options` are for the vehicle's command line."""
     scenario = folder / "lone.yaml"
     scenario.write_text(LONE.format(sysid=SYSID, airframe=airframe))
     physics, ports = free_port(), Ports(free_port(), free_port(), free_port())
@@ -43,6 +46,7 @@ def lone_vehicle(folder: Path, airframe: str = "omni_plus", speed: float = 1.0) 
     vehicle = ["sim_vehicles.process", str(scenario), "--sysid", str(SYSID)]
     vehicle += ["--physics-port", str(physics), "--mavlink-port", str(ports.mavlink)]
     vehicle += ["--listen-port", str(ports.listen), "--injector-port", str(ports.injector)]
+    vehicle += options
     with ExitStack() as stack:
         for words in ([*world, "--speed", str(speed)], vehicle):
             process = subprocess.Popen(

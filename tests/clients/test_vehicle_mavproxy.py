@@ -11,7 +11,17 @@ MAVPROXY = shutil.which("mavproxy.py", path=str(Path(sys.executable).parent))
 pytestmark = pytest.mark.skipif(MAVPROXY is None, reason="MAVProxy is not installed")
 SPEED = 3.0
 MODULES = "log,wp,rally,fence,param,arm,mode,rc,misc,cmdlong,link,output"
-TROUBLE = ("imeout", "down", "no link", "Failed", "rror", "etry", "DENIED", "UNSUPPORTED", "breach")
+TROUBLE = (
+    "imeout",
+    "down",
+    "no link",
+    "Failed",
+    "rror",
+    "retry",
+    "DENIED",
+    "UNSUPPORTED",
+    "breach",
+)
 WAY = """QGC WPL 110
 0 1 0 16 0 0 0 0 47.397742 8.545594 488 1
 1 0 3 16 0 0 0 0 47.397751 8.545594 0 1

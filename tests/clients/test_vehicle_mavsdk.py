@@ -88,14 +88,20 @@ async def parameters(rover: Any) -> None:
         await rover.param.get_param_float("SIM_GPS1_NOISE")
 
 
+async def armed_with_a_text(rover: Any) -> None:
+    """Nobody tells when a subscription has begun, so arm until a text has come through it."""
+    texts = first(rover.telemetry.status_text(), lambda t: t.text == "Throttle armed")
+    heard = asyncio.ensure_future(texts)
+    while not heard.done():
+        await rover.action.disarm()
+        await rover.action.arm()
+        await asyncio.wait({heard}, timeout=1.0)
+    assert heard.result().text == "Throttle armed"
+
+
 async def guided(rover: Any) -> None:
     offboard = rover.offboard
-    texts = asyncio.ensure_future(
-        first(rover.telemetry.status_text(), lambda t: t.text == "Throttle armed")
-    )
-    await asyncio.sleep(0)  # the subscription first
-    await rover.action.arm()
-    assert (await texts).text == "Throttle armed"
+    await armed_with_a_text(rover)
     await first(rover.telemetry.armed(), bool)
     await offboard.set_velocity_ned(mavsdk.offboard.VelocityNedYaw(0.5, 0.0, 0.0, 0.0))
     await offboard.start()
