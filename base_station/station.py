@@ -5,7 +5,7 @@ the step that the phase belongs to decides orders and the next phase (`steps/`) 
 orders into commands.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from base_station import doubt as doubts
@@ -40,6 +40,9 @@ TIMESYNC_S = 1.0
 CONTACT_GAP_S = 1.0  # two touches of a pair closer in time than this are one
 
 
+Decide = Callable[[Desk, Frame], Orders]
+
+
 @dataclass(frozen=True)
 class Outputs:
     """What one step wants done and said."""
@@ -51,10 +54,14 @@ class Outputs:
 
 
 class Station:
-    """Drives one fleet through the paper's steps [0a]-[4]. `step` never blocks."""
+    """Drives one fleet through the paper's steps [0a]-[4]. `step` never blocks.
 
-    def __init__(self, view: StationView) -> None:
+    `decide` gives the orders of a tick and moves the phases on.
+    """
+
+    def __init__(self, view: StationView, decide: Decide | None = None) -> None:
         self.desk = Desk(view)
+        self._decide = decide or own_decision
         self._commander = Commander(view)
         self._touched_s: dict[tuple[int, int], float] = {}
         self._beats_s = (float("-inf"), float("-inf"))  # last heartbeat: wall, fleet
@@ -121,7 +128,7 @@ class Station:
         self._note_contacts(frame)
         self._let_go_of_the_taken(frame)
         self._mind_the_time()
-        desk.orders = self._decide(frame)
+        desk.orders = self._decide(desk, frame)
         return self._commander.carry_out(desk.orders, desk.fleet.tracks, frame.time_s)
 
     def _take_alarms(self, alarms: Sequence[int]) -> None:
@@ -165,26 +172,27 @@ class Station:
             if desk.mission_s > desk.view.limits.mission_timeout_s:
                 desk.stop(f"mission not done after {desk.mission_s:.0f} s")
 
-    def _decide(self, frame: Frame) -> Orders:
-        desk = self.desk
-        if desk.alarmed and isinstance(desk.phase, PlanningBeta | OnMission | Returning):
-            desk.suspect_the_worst()
-        match desk.phase:
-            case Probing() as phase:
-                return probe(desk, phase, frame)
-            case Settling() as phase:
-                return settle(desk, phase, frame)
-            case PlanningAlpha(number=number):
-                return await_alpha(desk, number, frame)
-            case Experimenting() as phase:
-                return experiment(desk, phase, frame)
-            case Concluding() as phase:
-                return conclude(desk, phase, frame)
-            case PlanningBeta(number=number):
-                return await_beta(desk, number, frame)
-            case OnMission() as phase:
-                return drive(desk, phase, frame)
-            case Returning() as phase:
-                return go_home(desk, phase, frame)
-            case _:
-                return desk.hold()
+
+def own_decision(desk: Desk, frame: Frame) -> Orders:
+    """What the step that the phase belongs to decides."""
+    if desk.alarmed and isinstance(desk.phase, PlanningBeta | OnMission | Returning):
+        desk.suspect_the_worst()
+    match desk.phase:
+        case Probing() as phase:
+            return probe(desk, phase, frame)
+        case Settling() as phase:
+            return settle(desk, phase, frame)
+        case PlanningAlpha(number=number):
+            return await_alpha(desk, number, frame)
+        case Experimenting() as phase:
+            return experiment(desk, phase, frame)
+        case Concluding() as phase:
+            return conclude(desk, phase, frame)
+        case PlanningBeta(number=number):
+            return await_beta(desk, number, frame)
+        case OnMission() as phase:
+            return drive(desk, phase, frame)
+        case Returning() as phase:
+            return go_home(desk, phase, frame)
+        case _:
+            return desk.hold()

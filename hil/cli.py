@@ -73,6 +73,12 @@ def _shot(options: argparse.Namespace) -> int:
     return 0
 
 
+def _replay(options: argparse.Namespace) -> int:
+    from hil.bench.replaying import replay_run
+
+    return replay_run(options.logs, options.view)
+
+
 def _check(options: argparse.Namespace) -> int:
     from hil.bench.check import describe, refuse_hopeless
 
@@ -170,6 +176,13 @@ def _parser() -> argparse.ArgumentParser:
     shot.add_argument("--view", metavar="NAME", help="a tab, or a view by its title's beginning")
     shot.add_argument("-o", "--out", type=Path, required=True, metavar="PNG")
     shot.set_defaults(command=_shot)
+
+    replay = commands.add_parser("replay", help="diagnose recorded telemetry again")
+    replay.add_argument(
+        "logs", type=Path, nargs="+", metavar="RUN", help="a run's folder, or .tlog files"
+    )
+    replay.add_argument("--view", type=Path, metavar="FILE", help="as `hil station-view` prints it")
+    replay.set_defaults(command=_replay)
 
     check = commands.add_parser("check", parents=[scenario], help="validate a scenario")
     check.set_defaults(command=_check)
