@@ -1,35 +1,47 @@
 """The battery: current from the outputs as commanded, charge, voltage (pure).
 
-A 6-cell lithium battery of 10 Ah. The current follows what is commanded, not what a broken motor
-draws: in this testbed motor faults are silent.
+The pack is the airframe's. The current follows what is commanded, not what a broken motor draws:
+in this testbed motor faults are silent.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-CAPACITY_MAH = 10_000.0
-FULL_V, EMPTY_V = 25.2, 21.0
-RESISTANCE_OHM = 0.02
-IDLE_A = 0.6
-MOTOR_A = 3.0  # at full output
+from hil.airframe import Airframe, Battery
+
+
+STANDARD = Battery()
 
 
 @dataclass(frozen=True, slots=True)
 class BatteryState:
     """Terminal voltage (V), current (A), consumed charge (mAh)."""
 
-    voltage_v: float = FULL_V
+    voltage_v: float = STANDARD.full_v
     current_a: float = 0.0
     consumed_mah: float = 0.0
+    pack: Battery = STANDARD
+
+    @classmethod
+    def full(cls, pack: Battery) -> "BatteryState":
+        return cls(pack.full_v, pack=pack)
 
     @property
     def remaining_percent(self) -> int:
-        return max(0, 100 - int(100.0 * self.consumed_mah / CAPACITY_MAH))
+        return max(0, 100 - int(100.0 * self.consumed_mah / self.pack.capacity_mah))
 
 
 def drain(battery: BatteryState, outputs: Sequence[float], dt_s: float) -> BatteryState:
-    """The battery after dt with these motor outputs."""
-    current_a = IDLE_A + MOTOR_A * sum(map(abs, outputs))
-    consumed = min(CAPACITY_MAH, battery.consumed_mah + current_a * dt_s / 3.6)
-    open_v = FULL_V - (FULL_V - EMPTY_V) * consumed / CAPACITY_MAH
-    return BatteryState(open_v - RESISTANCE_OHM * current_a, current_a, consumed)
+    """The battery after dt with these motor loads (-1..1)."""
+    pack = battery.pack
+    current_a = pack.idle_a + pack.motor_a * sum(map(abs, outputs))
+    consumed = min(pack.capacity_mah, battery.consumed_mah + current_a * dt_s / 3.6)
+    open_v = pack.full_v - (pack.full_v - pack.empty_v) * consumed / pack.capacity_mah
+    voltage_v = open_v - pack.resistance_ohm * current_a
+    return replace(battery, voltage_v=voltage_v, current_a=current_a, consumed_mah=consumed)
+
+
+def loads(airframe: Airframe, outputs: Sequence[float]) -> tuple[float, ...]:
+    """Motor outputs as shares of full load (0..1): a rotor has its zero at -1."""
+    pairs = zip(airframe.motors, outputs, strict=True)
+    return tuple(abs(u) if m.reversible else (u + 1.0) / 2.0 for m, u in pairs)

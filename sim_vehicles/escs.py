@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from hil.airframe import pwm_to_output
 from hil.mavlink import Esc, EscTelemetry
-from sim_vehicles.battery import MOTOR_A, BatteryState
+from sim_vehicles.battery import BatteryState
 from sim_vehicles.damage import EscDamage
 
 FULL_RPM = 3000  # at full output, without load
@@ -25,7 +25,7 @@ def esc_telemetry(
     escs = []
     for pwm, broken in zip(pwm_us, damage, strict=False):
         output = abs(pwm_to_output(pwm) or 0.0)
-        rpm, amps = round(broken.gain * output * FULL_RPM), output * MOTOR_A
+        rpm, amps = round(broken.gain * output * FULL_RPM), output * battery.pack.motor_a
         count = int(now_s * REPORTS_HZ)
         sound = Esc(rpm, battery.voltage_v, amps, share_mah, WARM_DEGC, count)
         escs.append(_ABSENT if broken.off else sound)

@@ -69,6 +69,7 @@ def rover_parameters(sysid: int, station_sysid: int, airframe: Airframe) -> Para
     """The table that a ground station sees. Names and units are ArduPilot Rover 4.6's."""
     limit_mps = airframe.speed_limit_mps
     int8, int16 = ParamType.INT8, ParamType.INT16
+    first = 73 if airframe.steering == "skid" else 33  # throttle left and right, or motor 1
     cruise_mps = airframe.motors[0].free_speed_mps / 2.0  # speed at CRUISE_THROTTLE percent
     return Parameters(
         (
@@ -82,7 +83,7 @@ def rover_parameters(sysid: int, station_sysid: int, airframe: Airframe) -> Para
             _fixed("CRUISE_THROTTLE", 50, int8),
             _fixed("FORMAT_VERSION", 16),
             _fixed("FRAME_CLASS", 1, int8),
-            _fixed("FRAME_TYPE", 3, int8),  # omni plus
+            _fixed("FRAME_TYPE", airframe.frame_type, int8),
             Parameter("FENCE_ACTION", 2, 0, 2, int8),  # 0 report, 1 RTL, 2 hold
             Parameter("FENCE_ENABLE", 0, 0, 1, int8),
             Parameter("FENCE_RADIUS", 300, 0.5, 10_000),
@@ -92,7 +93,7 @@ def rover_parameters(sysid: int, station_sysid: int, airframe: Airframe) -> Para
             Parameter("FS_TIMEOUT", 5, 1, 100),
             _fixed("FS_ACTION", 2, int8),  # hold
             _fixed("INITIAL_MODE", RoverMode.HOLD, int8),
-            *(_fixed(f"SERVO{i}_FUNCTION", 32 + i) for i in range(1, len(airframe.motors) + 1)),
+            *(_fixed(f"SERVO{i}_FUNCTION", first + i) for i in range(len(airframe.motors))),
             *(_fixed(f"SERVO{i}_MIN", 1100) for i in range(1, len(airframe.motors) + 1)),
             *(_fixed(f"SERVO{i}_MAX", 1900) for i in range(1, len(airframe.motors) + 1)),
             *(_fixed(f"SERVO{i}_TRIM", 1500) for i in range(1, len(airframe.motors) + 1)),

@@ -41,6 +41,7 @@ from hil.mavlink import (
 )
 from sim_vehicles.autopilot import Autopilot, system_status
 from sim_vehicles.battery import BatteryState
+from sim_vehicles.copter_modes import copter_number
 from sim_vehicles.estimator import Estimate
 from sim_vehicles.innovation import Innovation
 from sim_vehicles.sensors import GpsFix, Inertial, Vector
@@ -105,11 +106,11 @@ class Snapshot:
 def heartbeat(s: Snapshot) -> Heartbeat:
     status = system_status(s.autopilot, s.ready)
     base_mode = MODE_FLAG_CUSTOM | _MODE_FLAGS.get(s.autopilot.mode, 0)
-    mode = s.autopilot.mode
+    mode = int(s.autopilot.mode)
+    if s.flies:
+        mode = copter_number(s.autopilot.mode, s.landed is LandedState.LANDING)
     kind = TYPE_QUADROTOR if s.flies else TYPE_ROVER
-    return Heartbeat(
-        kind, AUTOPILOT_ARDUPILOT, s.autopilot.armed, int(mode), int(status), base_mode
-    )
+    return Heartbeat(kind, AUTOPILOT_ARDUPILOT, s.autopilot.armed, mode, int(status), base_mode)
 
 
 def sys_status(s: Snapshot) -> SysStatus:

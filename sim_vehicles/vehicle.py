@@ -12,6 +12,7 @@ from typing import Literal
 from hil.airframe import mix, output_to_pwm
 from hil.frames import wrap_pi
 from hil.mavlink import (
+    CopterMode,
     FenceStatus,
     Heartbeat,
     HomePosition,
@@ -37,9 +38,11 @@ from sim_vehicles.autopilot import (
     check_sticks,
     check_target,
     disarm,
+    set_mode,
 )
-from sim_vehicles.battery import BatteryState, drain
+from sim_vehicles.battery import BatteryState, drain, loads
 from sim_vehicles.control import Drive, Memory, velocity_towards
+from sim_vehicles.copter_modes import mode_of
 from sim_vehicles.damage import MotorOutputs
 from sim_vehicles.escs import esc_telemetry
 from sim_vehicles.estimator import Estimate, Estimator
@@ -132,7 +135,7 @@ class Vehicle:
         self._autopilot = Autopilot()
         self._navigator = Navigator(self._origin)
         self._breaches, self._sagging = Breaches(), Sagging()
-        self._battery = BatteryState()
+        self._battery = BatteryState.full(member.frame.battery)
         self._memory = Memory()
         self._outputs = MotorOutputs(member.frame)
         self._now_s: float | None = None
@@ -148,7 +151,7 @@ class Vehicle:
 
     def _connect(self) -> None:
         """The services of all stations, and the injector's, which alone can break the vehicle."""
-        modes = ModeService(self._apply)
+        modes = ModeService(self._apply, self._fly_in if self._drive.airframe.flight else None)
         setpoints = SetpointService(self._origin, self._estimator.estimate, self._apply)
         fence = FenceService(self._parameters, self._navigator)
         self._missions = MissionService(self._navigator, self._origin, self._home, self._apply)
@@ -306,7 +309,7 @@ class Vehicle:
             self._memory = settle(self._memory.afresh(estimate.yaw_rad))
             self._battery = drain(self._battery, (), dt_s)
             return pad_channels([output_to_pwm(None)] * len(self._drive.airframe.motors))
-        if self._autopilot.mode is RoverMode.MANUAL and not self._hovers:
+        if self._autopilot.mode is RoverMode.MANUAL and not self._drive.airframe.flight:
             sticks = self._piloting.sticks
             airframe = self._drive.airframe
             outputs = mix(airframe, sticks.throttle, sticks.lateral, sticks.steering)
@@ -316,7 +319,7 @@ class Vehicle:
             if self._memory.landing and has_landed(self._memory):
                 self._memory = settle(self._memory)
                 self._apply(lambda state, _ready: disarm(state))
-        self._battery = drain(self._battery, outputs, dt_s)
+        self._battery = drain(self._battery, loads(self._drive.airframe, outputs), dt_s)
         return pad_channels([output_to_pwm(output) for output in outputs])
 
     @property
@@ -338,8 +341,21 @@ class Vehicle:
     def _land(self) -> Result:
         if not self._hovers:
             return Result.FAILED
+        self._apply(lambda state, ready: set_mode(state, RoverMode.HOLD, ready))
         self._memory = land(self._memory)
         return Result.ACCEPTED
+
+    def _fly_in(self, number: int) -> Result:
+        """Change to a mode by its number as a copter; that ends a landing."""
+        if number == CopterMode.LAND:
+            return self._land()
+        mode = mode_of(number)
+        if mode is None:
+            return Result.UNSUPPORTED
+        result = self._apply(lambda state, ready: set_mode(state, mode, ready))
+        if result is Result.ACCEPTED:
+            self._memory = replace(self._memory, landing=False)
+        return result
 
     def _aim(self, estimate: Estimate, dt_s: float) -> Vector:
         """The velocity that the target asks for now; turns the heading to hold towards it."""

@@ -8,6 +8,7 @@ from hil.mavlink import (
     COMPONENT_AUTOPILOT,
     COMPONENT_GCS,
     CommandAck,
+    CopterMode,
     Decoder,
     Encoder,
     Frame,
@@ -86,10 +87,12 @@ class InWorld:
             acks = self.sent(CommandAck, sysid, "injector")
             assert [a.result for a in acks] == [Result.ACCEPTED], numbers
 
-    def guided(self, mode: int = RoverMode.GUIDED) -> None:
+    def guided(self) -> None:
         """Everybody ready, armed and in GUIDED."""
         self.run(1.5)
         for sysid in self.vehicles:
+            flies = self.scenario.vehicle(sysid).frame.flight
+            mode = CopterMode.GUIDED if flies else RoverMode.GUIDED
             self.tell(self.station.set_mode(sysid, mode), sysid)
             self.tell(self.station.arm(sysid), sysid)
 

@@ -101,6 +101,7 @@ class Airframe:
     height_m: float = 0.3
     battery: Battery = Battery()
     flight: Flight | None = None
+    frame_type: int = 0  # ArduPilot's FRAME_TYPE
 
     @property
     def weight_n(self) -> float:

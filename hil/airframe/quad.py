@@ -9,10 +9,11 @@ from hil.airframe.model import UP, Airframe, Battery, Flight, Motor
 # (0.02-0.03 kg m2 about x and y, 0.04 about z); torque per thrust 0.016 m is a 10 x 4.5 propeller.
 _HALF_M = 0.25 * math.sqrt(0.5)
 _THRUST_N = 11.0
+_PITCH_MPS = 17.0  # 4.5 inch of pitch at 9,000 rpm
 
 
 def _rotor(x: float, y: float, spin: int) -> Motor:
-    return Motor((x * _HALF_M, y * _HALF_M), UP, _THRUST_N, math.inf, spin=spin)
+    return Motor((x * _HALF_M, y * _HALF_M), UP, _THRUST_N, _PITCH_MPS, spin=spin)
 
 
 QUAD_X = Airframe(
@@ -26,6 +27,7 @@ QUAD_X = Airframe(
     # ArduPilot's order: front right, rear left (both counter-clockwise), front left, rear right
     motors=(_rotor(1, 1, 1), _rotor(-1, -1, 1), _rotor(1, -1, -1), _rotor(-1, 1, -1)),
     steering="flight",
+    frame_type=1,
     drag_area_m2=0.06,
     height_m=0.25,
     battery=Battery(capacity_mah=5_000.0, full_v=16.8, empty_v=13.2, motor_a=15.0),

@@ -31,6 +31,17 @@ class RoverMode(IntEnum):
     INITIALISING = 16
 
 
+class CopterMode(IntEnum):
+    """ArduPilot Copter's custom modes, the part of them this project knows."""
+
+    STABILIZE = 0
+    AUTO = 3
+    GUIDED = 4
+    LOITER = 5
+    RTL = 6
+    LAND = 9
+
+
 class SystemStatus(IntEnum):
     """MAV_STATE."""
 

@@ -11,10 +11,18 @@ Change = Callable[[Autopilot, Readiness], Transition]
 
 
 class ModeService:
-    """Asks for transitions. `apply` puts one into effect, given what the vehicle is ready for."""
+    """Asks for transitions. `apply` puts one into effect, given what the vehicle is ready for.
 
-    def __init__(self, apply: Callable[[Change], Result]) -> None:
+    `change_mode` takes custom mode numbers; without it they are a rover's.
+    """
+
+    def __init__(
+        self,
+        apply: Callable[[Change], Result],
+        change_mode: Callable[[int], Result] | None = None,
+    ) -> None:
         self._apply = apply
+        self._change_mode = change_mode or self._rover_mode
 
     def handlers(self) -> Handlers:
         return {SetMode: self._set_mode_message}
@@ -37,7 +45,7 @@ class ModeService:
             return DENIED
         return Outcome(self._change_mode(custom_mode))
 
-    def _change_mode(self, number: int) -> Result:
+    def _rover_mode(self, number: int) -> Result:
         return self._apply(lambda state, ready: set_mode(state, number, ready))
 
     def _arm_disarm(self, order: Order) -> Outcome:

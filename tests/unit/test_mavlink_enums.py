@@ -8,6 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega
 from hil import mavlink
 
 PREFIXES: list[tuple[type[IntEnum | IntFlag], str]] = [
+    (mavlink.CopterMode, "COPTER_MODE_"),
     (mavlink.SystemStatus, "MAV_STATE_"),
     (mavlink.Severity, "MAV_SEVERITY_"),
     (mavlink.Result, "MAV_RESULT_"),

@@ -12,10 +12,10 @@ from hil.mavlink import (
     Attitude,
     Command,
     CommandAck,
+    CopterMode,
     ExtendedSysState,
     Heartbeat,
     Result,
-    RoverMode,
 )
 
 REST: Velocity = (0.0, 0.0, 0.0)
@@ -155,17 +155,36 @@ def test_quad_lands_and_disarms(quad: InWorld) -> None:
     assert quad.pwm[1][:4] == (0, 0, 0, 0)
 
 
+def test_quad_modes_are_copters(quad: InWorld) -> None:
+    def told() -> int:
+        quad.clear()
+        quad.run(2.0)
+        return quad.sent(Heartbeat)[-1].custom_mode
+
+    def asked(mode: int) -> int:
+        return ordered(quad, Command.DO_SET_MODE, 1.0, float(mode))
+
+    assert told() == CopterMode.GUIDED
+    assert asked(CopterMode.LAND) == Result.ACCEPTED
+    assert told() == CopterMode.LAND
+    assert asked(CopterMode.LOITER) == Result.ACCEPTED
+    assert told() == CopterMode.LOITER
+    assert quad.truth().down_m < -1.0
+    assert asked(CopterMode.STABILIZE) == Result.UNSUPPORTED
+    assert asked(CopterMode.GUIDED) == Result.ACCEPTED
+
+
 def test_take_off_and_landing_need_their_moment() -> None:
     rover, on_ground = ready("skid_steer"), ready("quad_x")
     assert ordered(rover, Command.NAV_TAKEOFF, 0, 0, 0, NAN, 0, 0, 5.0) == Result.UNSUPPORTED
     assert ordered(on_ground, Command.NAV_LAND) == Result.FAILED
     assert ordered(on_ground, Command.NAV_TAKEOFF, 0, 0, 0, NAN, 0, 0, -5.0) == Result.DENIED
-    on_ground.tell(on_ground.station.set_mode(1, RoverMode.HOLD))
+    on_ground.tell(on_ground.station.set_mode(1, CopterMode.LOITER))
     assert ordered(on_ground, Command.NAV_TAKEOFF, 0, 0, 0, NAN, 0, 0, 5.0) == Result.FAILED
 
 
 def test_no_mode_cuts_the_rotors_in_the_air_but_disarming_does(quad: InWorld) -> None:
-    quad.tell(quad.station.set_mode(1, RoverMode.HOLD))
+    quad.tell(quad.station.set_mode(1, CopterMode.LOITER))
     quad.run(5.0)
     assert quad.truth().down_m == pytest.approx(-5.0, abs=0.2)
     ordered(quad, Command.COMPONENT_ARM_DISARM, 0.0, 21196.0)
