@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 from hil.airframe import Airframe, Battery
 
-
 STANDARD = Battery()
 
 

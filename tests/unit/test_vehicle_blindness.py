@@ -20,6 +20,8 @@ from hil.scenario import Scenario
 FAULTS = {
     "y motors off": [(101, 1, 3), (101, 1, 4)],
     "all motors off": [(101, 1, 0)],
+    "all motors stuck at their outputs": [(101, 2, 0)],
+    "all motors intermittent": [(101, 7, 0)],
     "GPS stuck": [(4, 2, 0)],
 }
 
