@@ -4,6 +4,7 @@ import queue
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -86,16 +87,22 @@ class Console:
         self.process.stdin.write(line + "\n")
         self.process.stdin.flush()
 
-    def expect(self, words: str) -> str:
-        """Wait for a line with these words."""
-        while True:
+    def expect(self, words: str, again: str | None = None) -> str:
+        """Wait for a line with these words; `again` is told anew each half second until then."""
+        end_s = time.monotonic() + PATIENCE_S
+        tell_s = time.monotonic() if again else end_s
+        while (now_s := time.monotonic()) < end_s:
+            if again is not None and now_s >= tell_s:
+                self.tell(again)
+                tell_s = now_s + 0.5
             try:
-                line = self._lines.get(timeout=PATIENCE_S)
+                line = self._lines.get(timeout=max(0.01, min(end_s, tell_s) - now_s))
             except queue.Empty:
-                raise AssertionError(f"no {words!r} after:\n" + "\n".join(self.said)) from None
+                continue
             self.said.append(line)
             if words in line:
                 return line
+        raise AssertionError(f"no {words!r} after:\n" + "\n".join(self.said))
 
     def stop(self) -> None:
         self.process.kill()

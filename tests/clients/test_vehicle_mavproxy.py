@@ -10,6 +10,7 @@ from lone_vehicle import Console, Ports, lone_vehicle
 MAVPROXY = shutil.which("mavproxy.py", path=str(Path(sys.executable).parent))
 pytestmark = pytest.mark.skipif(MAVPROXY is None, reason="MAVProxy is not installed")
 SPEED = 3.0
+AGAIN = "again: "  # MAVProxy says it once; a velocity lasts for three seconds of vehicle time
 MODULES = "log,wp,rally,fence,param,arm,mode,rc,misc,cmdlong,link,output"
 TROUBLE = (
     "imeout",
@@ -46,8 +47,8 @@ def drive(prompt: Console) -> None:
         ("mode GUIDED", "Mode GUIDED"),
         ("arm throttle", "AP: Throttle armed"),
         (None, "ARMED"),
-        ("velocity 0.5 0 0", None),
-        ("watch VFR_HUD", "groundspeed : 0.4"),
+        ("watch VFR_HUD", None),
+        (AGAIN + "velocity 0.6 0 0", "groundspeed : 0.5"),
         ("watch", None),
         ("wp load way.txt", "Got MISSION_ACK: TYPE_MISSION: ACCEPTED"),
         ("wp list", "Saved waypoints to"),
@@ -67,6 +68,9 @@ def drive(prompt: Console) -> None:
         ("fence list", "Requesting 0 fence items"),
         ("rally list", "Requesting 0 rally items"),
     ):
+        if said is not None and said.startswith(AGAIN):
+            prompt.expect(str(heard), again=said.removeprefix(AGAIN))
+            continue
         if said is not None:
             prompt.tell(said)
         if heard is not None:

@@ -3,11 +3,23 @@
 import math
 from pathlib import Path
 
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from vehicle_harness import Harness
 
-from hil.mavlink import CommandAck, Encoder, LocalSetpoint, MessageId, RoverMode
+from hil.mavlink import (
+    Command,
+    CommandAck,
+    CommandInt,
+    Encoder,
+    GlobalSetpoint,
+    LocalSetpoint,
+    ManualControl,
+    MessageId,
+    MissionCount,
+    MissionItem,
+    RoverMode,
+)
 from hil.scenario import load_scenario
 
 SCENARIO = load_scenario(Path(__file__).parents[2] / "scenarios" / "rescue.yaml")
@@ -103,3 +115,90 @@ def test_any_command_gets_one_ack_and_the_vehicle_goes_on(
     rover.run(0.1)
     answers = rover.tell(STATION.request_message(2, MessageId.AUTOPILOT_VERSION))
     assert len(answers) == 2
+
+
+@settings(max_examples=40)
+@given(NOT_NUMBERS, st.integers(0, 2), st.sampled_from([0, 3, 5, 6, 10, 11, 1, 99]))
+def test_global_set_points_that_cannot_be_meant_are_refused(
+    bad: float, field: int, frame: int
+) -> None:
+    velocity, yaw, rate = ((bad if field == k else 0.1) for k in range(3))
+    motion = (0.1, velocity, 0.0)
+    setpoint = GlobalSetpoint(2, 1, 0.0, frame, 7 | 448, None, motion, yaw, rate)
+    assert driven(STATION.encode(setpoint)) == UNDISTURBED
+
+
+@settings(max_examples=20)
+@given(st.floats(-90, 90), st.floats(-180, 180))
+def test_points_on_the_other_side_of_the_globe_are_refused(lat: float, lon: float) -> None:
+    assume(abs(lat - 47.4) > 2.0)
+    setpoint = GlobalSetpoint(2, 1, 0.0, 6, 3576, (lat, lon, 0.0), None, None, None)
+    assert driven(STATION.encode(setpoint)) == UNDISTURBED
+
+
+@settings(max_examples=20)
+@given(st.lists(st.integers(-1000, 1000), min_size=4, max_size=4), st.integers(0, 255))
+def test_sticks_move_nothing_outside_manual(axes: list[int], target: int) -> None:
+    x, y, z, r = (a / 1000 for a in axes)
+    assert driven(STATION.encode(ManualControl(target, x, y, z, r))) == UNDISTURBED
+
+
+ITEMS = st.builds(
+    MissionItem,
+    target_sysid=st.just(2),
+    target_compid=st.just(1),
+    seq=st.integers(0, 3),
+    frame=st.sampled_from([0, 3, 6, 1, 200]),
+    command=st.sampled_from([16, 17, 20, 93, 178, 5001, 5003, 5100, 0, 65535]),
+    params=st.tuples(*[st.floats(width=32)] * 4),
+    x=st.one_of(st.integers(-(2**31), 2**31 - 1), st.just(473977420)),
+    y=st.one_of(st.integers(-(2**31), 2**31 - 1), st.just(85455940)),
+    z=st.floats(width=32),
+    mission_type=st.sampled_from([0, 0, 1, 2, 255, 9]),
+)
+
+
+@settings(max_examples=60)
+@given(
+    st.lists(
+        st.one_of(
+            ITEMS,
+            st.builds(MissionCount, st.just(2), st.just(1), st.integers(0, 4), st.integers(0, 3)),
+        ),
+        max_size=12,
+    )
+)
+def test_whatever_is_uploaded_the_vehicle_drives_on(messages: list[MissionItem]) -> None:
+    rover = Harness(SCENARIO)
+    rover.guided()
+    for kind in (0, 1, 2):
+        rover.tell(STATION.encode(MissionCount(2, 1, 2, kind)))
+        for message in messages:
+            rover.tell(STATION.encode(message))
+    rover.tell(STATION.param_set(2, "FENCE_ENABLE", 1.0))
+    rover.tell(STATION.set_mode(2, RoverMode.AUTO))
+    rover.run(0.3)
+    assert all(0 <= p <= 1900 for p in rover.pwm)
+    assert all(math.isfinite(p) for p in rover.position_m)
+    answers = rover.tell(STATION.request_message(2, MessageId.AUTOPILOT_VERSION))
+    assert len(answers) == 2
+
+
+@settings(max_examples=40)
+@given(
+    st.sampled_from([int(c) for c in Command]),
+    st.lists(st.floats(width=32), min_size=5, max_size=5),
+    st.integers(-(2**31), 2**31 - 1),
+    st.integers(-(2**31), 2**31 - 1),
+    st.integers(0, 255),
+)
+def test_any_command_int_gets_one_ack(
+    number: int, numbers: list[float], x: int, y: int, frame: int
+) -> None:
+    rover = Harness(SCENARIO)
+    rover.run(0.1)
+    p1, p2, p3, p4, z = numbers
+    command = CommandInt(2, 1, frame, number, (p1, p2, p3, p4), x, y, z)
+    answers = rover.tell(STATION.encode(command))
+    assert [r.value.command for r in answers if isinstance(r.value, CommandAck)] == [number]
+    rover.run(0.1)
