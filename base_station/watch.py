@@ -25,8 +25,8 @@ NOISE_SIGMA_M = 0.03  # of one report after the vehicle's filter
 MOTION_ERROR = (
     0.30  # of the motion the twin expects: one sigma of rolling resistance is 18 % of a pulse
 )
-CONTACT_GAP_M = 0.15  # closer than this two vehicles may be touching ...
-CONTACT_SIGMA_M = 0.30  # ... and how they slide off each other is beyond the twin
+CONTACT_GAP_M = 0.15  # closer than this, vehicles or a vehicle and a wall may be touching ...
+CONTACT_SIGMA_M = 0.30  # ... and how they slide along each other is beyond the twin
 MEMORY_S = 60.0
 
 
@@ -61,12 +61,15 @@ class Baseline:
         return replace(self, known=(*self.known, hypothesis))
 
 
-def near_contact(position_m: Array, radius_m: Array) -> NDArray[np.bool_]:
-    """[V]: vehicles within CONTACT_GAP_M of another, from positions [V, 2]."""
+def near_contact(position_m: Array, vehicles: twin.Vehicles) -> NDArray[np.bool_]:
+    """[V]: which of positions [V, 2] are within CONTACT_GAP_M of another vehicle or of a wall."""
+    radius_m, bounds_m = vehicles.radius_m, vehicles.bounds_m
     gaps = np.linalg.norm(position_m[:, None] - position_m[None, :], axis=-1)
     gaps = gaps - radius_m[:, None] - radius_m[None, :]
     np.fill_diagonal(gaps, np.inf)
-    return np.asarray(gaps.min(axis=1) < CONTACT_GAP_M)
+    to_walls = np.hstack([position_m - bounds_m[[0, 2]], bounds_m[[1, 3]] - position_m])
+    nearest = np.minimum(gaps.min(axis=1), to_walls.min(axis=1) - radius_m)
+    return np.asarray(nearest < CONTACT_GAP_M)
 
 
 def correct(states: Array, frame: Frame, trusted: NDArray[np.bool_], gain: float) -> Array:
@@ -89,7 +92,7 @@ class Watch:
         self._trusted = self._faults.gps_stuck < 0.5
         self._period_s = 1.0 / view.clock.telemetry_hz
         self.state = state
-        self._motion_sigma_m = np.zeros((len(view.fleet), 2))  # builds up and fades like the error
+        self._model_sigma_m = np.zeros((len(view.fleet), 2))  # builds up and fades like the error
         self.travelled_m = [0.0] * len(view.fleet)  # by the twin, since this belief began
         self.threshold = detection.threshold(
             view.diagnosis.false_alarms_per_hour, view.clock.telemetry_hz, len(view.fleet)
@@ -107,11 +110,7 @@ class Watch:
     @property
     def sigma_m(self) -> Array:
         """[V, 2]: one standard deviation of the residual before it is normalised."""
-        sigma = np.hypot(NOISE_SIGMA_M, self._motion_sigma_m)
-        touching = near_contact(
-            self.state[:, twin.NORTH : twin.EAST + 1], self.baseline.model.vehicles.radius_m
-        )
-        return np.where(touching[:, None], np.hypot(sigma, CONTACT_SIGMA_M), sigma)
+        return np.asarray(np.hypot(NOISE_SIGMA_M, self._model_sigma_m))
 
     def tick(self, frame: Frame, orders: Orders) -> tuple[int, ...]:
         """Move on under `orders` to `frame`; indices of the vehicles whose alarm stands now."""
@@ -130,7 +129,7 @@ class Watch:
         before, self.state = self.state, moved.states[0]
         steps = (self.state - before)[:, twin.NORTH : twin.EAST + 1]
         gain = self._period_s / CORRECTION_TIME_S
-        self._motion_sigma_m = (1.0 - gain) * self._motion_sigma_m + MOTION_ERROR * np.abs(steps)
+        self._model_sigma_m = self._grown_sigma(steps, gain, frame)
         self.travelled_m = [
             m + float(np.hypot(*d)) for m, d in zip(self.travelled_m, steps, strict=True)
         ]
@@ -139,6 +138,15 @@ class Watch:
         self.state = correct(moved.states, frame, self._trusted, gain)[0]
         self.memory.append(Moment(frame, orders, self.state))
         return tuple(int(v) for v in np.flatnonzero(self.cusum.level.max(axis=1) > self.threshold))
+
+    def _grown_sigma(self, steps_m: Array, gain: float, frame: Frame) -> Array:
+        """[V, 2]: the twin's own error after one more tick in which it moved by `steps_m`."""
+        grown = (1.0 - gain) * self._model_sigma_m + MOTION_ERROR * np.abs(steps_m)
+        believed_m = self.state[:, twin.NORTH : twin.EAST + 1]
+        seen_m = np.where(frame.fresh[:, None], frame.position_m, believed_m)
+        vehicles = self.baseline.model.vehicles
+        touching = near_contact(believed_m, vehicles) | near_contact(seen_m, vehicles)
+        return np.where(touching[:, None], np.maximum(grown, CONTACT_SIGMA_M), grown)
 
 
 def _nothing_more(view: StationView) -> Hypothesis:
