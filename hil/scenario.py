@@ -268,6 +268,10 @@ class Diagnosis(Model):
 
 
 class Planning(Model):
+    """`planner` finds the experiment; the mission is always learned."""
+
+    planner: Literal["ppo", "cem", "shooting", "random", "gradient", "ram"] = "ppo"
+    objective: Literal["paper_distance", "paper_printed", "information"] = "paper_distance"
     preset: Literal["tuned", "paper"] = "tuned"
     suspect: Literal["held", "commanded"] = "held"
     alpha_horizon_s: Positive = 8.0

@@ -1,12 +1,11 @@
 """Learning to tell hypotheses apart: twins under the same commands, rewarded for disagreeing."""
 
 from dataclasses import dataclass
-from itertools import combinations
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from base_station.planning.objectives import Moment, Objective, Terms
 from base_station.planning.policy import Commands, act, to_setpoints
 from base_station.planning.requests import PolicyWeights
 from base_station.planning.starts import scattered
@@ -29,10 +28,8 @@ from base_station.twin import (
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-Rho = Literal["own_state", "printed"]
 
 START_SIGMA_M = 0.03
-WALL_COST = 1.0  # per vehicle, twin and control period
 NEAR_START_SHARE = 0.5  # of the episodes at first start near the suspect; fades to none half-way
 SCALE_M = 2.0
 
@@ -41,8 +38,7 @@ SCALE_M = 2.0
 class AlphaProblem:
     """Tell the hypotheses in `faults` apart from states `start` [H, V, S] in `steps` periods.
 
-    `rho` says what a twin starts each step from: its own state (the paper's workflow) or the first
-    one's (the formula as printed).
+    `objective` says what that is worth.
     """
 
     model: FleetModel
@@ -52,13 +48,18 @@ class AlphaProblem:
     suspect: int
     period_s: float
     steps: int
-    rho: Rho = "own_state"
+    objective: Objective
 
-    def move(self, parameters: Parameters, states: Array, setpoints: Array) -> Flags:
-        """One control period of states [E, H, V, S] in place; returns wall touches [E, H, V]."""
-        hypotheses = states.shape[1]
+    def move(self, parameters: Parameters, states: Array, memory: Array, setpoints: Array) -> Terms:
+        """One control period of states [E, H, V, S] and memory [E, M] in place: named rewards.
+
+        `setpoints` [E, V, 3].
+        """
+        hypotheses, count = states.shape[1:3]
         batch = states.reshape(-1, *states.shape[2:])
         walls = np.zeros(batch.shape[:2], dtype=np.bool_)
+        pairs = count if self.objective.contacts else 0
+        impulses = np.zeros((len(batch), pairs, pairs))
         advance_in_place(
             self.model,
             parameters,
@@ -67,18 +68,30 @@ class AlphaProblem:
             np.repeat(setpoints, hypotheses, axis=0),
             np.tile(self.commands.driven, (len(batch), 1)),
             self.period_s,
-            np.empty((len(batch), 0, 0)),
+            impulses,
             walls,
         )
-        return walls.reshape(states.shape[:3])
+        moment = Moment(
+            self.model,
+            self.period_s,
+            states,
+            self.reports(states),
+            walls.reshape(states.shape[:3]),
+            impulses.reshape(*states.shape[:2], pairs, pairs),
+        )
+        terms = self.objective.terms(moment, memory)
+        if not self.objective.own_state:
+            states[:] = states[:, :1]
+        return terms
 
     def reports(self, states: Array) -> Array:
         """[E, H, V, 2] of states [E, H, V, S]."""
         flat = report(states.reshape(-1, *states.shape[2:]), self.faults)
         return flat.reshape(*states.shape[:3], 2)
 
-    def observe(self, states: Array, elapsed: NDArray[np.int64]) -> Array:
-        """[E, O]: where each twin believes all to be, how their reports differ, and the time."""
+    def observe(self, states: Array, memory: Array, elapsed: NDArray[np.int64]) -> Array:
+        """[E, O]: where each twin believes all to be, how their reports differ, what the objective
+        remembers, and the time."""
         reports = self.reports(states)
         origin = self.start[0, self.suspect, NORTH : EAST + 1]
         blocks: list[Array] = [
@@ -86,29 +99,35 @@ class AlphaProblem:
             states[..., V_NORTH : V_EAST + 1] / self.model.vehicles.speed_limit_mps[:, None],
             reports[:, 1:] - reports[:, :1],
             np.asarray(elapsed / self.steps),
+            self.objective.seen(memory),
         ]
         if not self.model.vehicles.yaw_locked:
             blocks += [np.cos(states[..., YAW]), np.sin(states[..., YAW])]
         return np.concatenate([block.reshape(len(states), -1) for block in blocks], axis=1)
 
 
-def rho_alpha(reports: Array) -> Array:
-    """The paper's reward: reports [E, H, V, 2] to the summed disagreement of all pairs, [E] (m)."""
-    total = np.zeros(len(reports))
-    for a, b in combinations(range(reports.shape[1]), 2):
-        total += np.linalg.norm((reports[:, a] - reports[:, b]).reshape(len(reports), -1), axis=1)
-    return total
-
-
 def nominal_actions(problem: AlphaProblem, weights: PolicyWeights) -> Array:
     """The deterministic policy played on the nominal twin: actions [K, A]."""
     states = problem.start[None].copy()
+    memory = problem.objective.begin(problem.reports(states))
     actions = []
     for k in range(problem.steps):
-        action = act(weights, problem.observe(states, np.array([k])))
-        problem.move(problem.model.nominal, states, to_setpoints(action, problem.commands))
+        action = act(weights, problem.observe(states, memory, np.array([k])))
+        setpoints = to_setpoints(action, problem.commands)
+        problem.move(problem.model.nominal, states, memory, setpoints)
         actions.append(action[0])
     return np.array(actions)
+
+
+def nominal_returns(problem: AlphaProblem, actions: Array) -> Array:
+    """What action sequences [C, K, A] earn on the nominal twin, [C]."""
+    states = np.repeat(problem.start[None], len(actions), axis=0)
+    memory = problem.objective.begin(problem.reports(states))
+    setpoints, total = to_setpoints(actions, problem.commands), np.zeros(len(actions))
+    for k in range(problem.steps):
+        terms = problem.move(problem.model.nominal, states, memory, setpoints[:, k])
+        total += sum(terms.values())
+    return total
 
 
 class AlphaTask:
@@ -119,29 +138,29 @@ class AlphaTask:
         self.action_size = problem.commands.size
         self._problem, self._rng = problem, rng
         self._parameters = perturbed(problem.model, rng, environments)
-        self._states = np.empty((environments, *problem.start.shape))
+        self._states = np.zeros((environments, *problem.start.shape))
+        self._memory = problem.objective.begin(problem.reports(self._states))
         self._elapsed = np.zeros(environments, dtype=np.int64)
         self.observation_size = self.reset().shape[1]
 
     def reset(self) -> Array:
         self._begin(np.ones(self.environments, dtype=np.bool_))
-        return self._problem.observe(self._states, self._elapsed)
+        return self._observe()
 
     def step(self, actions: Array) -> Step:
         problem = self._problem
         setpoints = to_setpoints(actions, problem.commands)
-        walls = problem.move(self._parameters, self._states, setpoints)
+        terms = problem.move(self._parameters, self._states, self._memory, setpoints)
         self._elapsed += 1
-        rewards = rho_alpha(problem.reports(self._states)) * problem.period_s
-        rewards -= WALL_COST * walls.sum(axis=(1, 2))
-        if problem.rho == "printed":
-            self._states[:] = self._states[:, :1]
-        final = problem.observe(self._states, self._elapsed)
+        final = self._observe()
         dones = self._elapsed >= problem.steps
         if not dones.any():
-            return Step(final, rewards, dones, final)
+            return Step(final, terms, dones, final)
         self._begin(dones)
-        return Step(problem.observe(self._states, self._elapsed), rewards, dones, final)
+        return Step(self._observe(), terms, dones, final)
+
+    def _observe(self) -> Array:
+        return self._problem.observe(self._states, self._memory, self._elapsed)
 
     def _begin(self, which: Flags) -> None:
         """New episodes; some of them with the commanded vehicles anywhere around the suspect."""
@@ -158,4 +177,5 @@ class AlphaTask:
             states[near, :, v, NORTH : EAST + 1] = place[:, None]
             states[near, :, v, HELD_NORTH : HELD_EAST + 1] = place[:, None]
         self._states[which] = states
+        self._memory[which] = problem.objective.begin(problem.reports(states))
         self._elapsed[which] = 0

@@ -5,6 +5,7 @@ of delta: `paper` pays b whenever the vehicle is at its goal, `delivered` once, 
 adds phi(s') - phi(s) with phi = 0 at the end: that leaves the order of policies as it is.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -38,6 +39,7 @@ from base_station.twin import (
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Base = Literal["delivered", "paper"]
+Play = Callable[[Array, Flags, int], Array]  # states, delivered, control period to actions [E, A]
 
 A = 0.01
 B = 100.0
@@ -145,30 +147,32 @@ class BetaTask:
         walls = problem.move(self._parameters, self._states, actions, self._active)
         self._elapsed += 1
         at_goal = problem.arrived(self._states)
-        rewards = self._base(at_goal, walls)
+        terms = self._base(at_goal, walls)
         self._delivered |= at_goal
         dones = self._delivered.all(axis=1) | (self._elapsed >= problem.steps)
         if problem.shaped:
             after = problem.potential(self._states, self._delivered)
-            rewards += np.where(dones, 0.0, after) - before
+            terms["shaping"] = np.where(dones, 0.0, after) - before
         final = problem.observe(self._states, self._delivered, self._elapsed)
         if not dones.any():
-            return Step(final, rewards, dones, final)
+            return Step(final, terms, dones, final)
         self._begin(dones)
         observations = problem.observe(self._states, self._delivered, self._elapsed)
-        return Step(observations, rewards, dones, final)
+        return Step(observations, terms, dones, final)
 
-    def _base(self, at_goal: Flags, walls: Flags) -> Array:
+    def _base(self, at_goal: Flags, walls: Flags) -> dict[str, Array]:
         problem = self._problem
         r = np.linalg.norm(problem.goals_m - self._states[..., NORTH : EAST + 1], axis=-1)
         paid = at_goal & ~self._delivered if problem.base == "delivered" else at_goal
-        rewards = REWARD_SCALE * (A / (r + 1.0) + B * paid).sum(axis=1)
-        rewards -= WALL_COST * walls.sum(axis=1)
+        terms = {
+            "progress": REWARD_SCALE * (A / (r + 1.0)).sum(axis=1),
+            "arrival": REWARD_SCALE * B * paid.sum(axis=1),
+            "wall": -WALL_COST * walls.sum(axis=1),
+        }
         if problem.broken is not None:
             off = np.maximum(0.0, r[:, problem.broken] - problem.radius_m)
-            rewards -= SHOVED_COST * off * self._delivered[:, problem.broken]
-        result: Array = rewards
-        return result
+            terms["shoved"] = -SHOVED_COST * off * self._delivered[:, problem.broken]
+        return terms
 
     def _begin(self, which: Flags) -> None:
         n = int(which.sum())
@@ -210,19 +214,27 @@ def near_starts(problem: BetaProblem, rng: np.random.Generator, states: Array) -
 def success_share(
     problem: BetaProblem, weights: PolicyWeights, rng: np.random.Generator, n: int
 ) -> float:
-    """The share of `n` perturbed rollouts of the deterministic policy, from nominal starts, that
-    deliver all and, after rolling out in HOLD, leave the broken vehicle at its goal."""
+    """The share of `n` perturbed rollouts of the deterministic policy that bring all home."""
+
+    def play(states: Array, delivered: Flags, k: int) -> Array:
+        return act(weights, problem.observe(states, delivered, np.full(n, k)))
+
+    return float(brought_home(problem, play, rng, n).mean())
+
+
+def brought_home(problem: BetaProblem, play: Play, rng: np.random.Generator, n: int) -> Flags:
+    """Which of `n` perturbed rollouts from nominal starts deliver all and, after rolling out in
+    HOLD, leave the broken vehicle at its goal, [N]."""
     parameters = perturbed(problem.model, rng, n)
     states = nominal_starts(problem, rng, n)
     delivered = np.tile(problem.delivered, (n, 1))
     for k in range(problem.steps + SETTLE_STEPS):
         active = np.asarray(~delivered.all(axis=1) & (k < problem.steps))
-        observations = problem.observe(states, delivered, np.full(n, k))
-        problem.move(parameters, states, act(weights, observations), active)
+        problem.move(parameters, states, play(states, delivered, k), active)
         if k < problem.steps:
             delivered |= problem.arrived(states)
-    done = delivered.all(axis=1)
+    done = np.asarray(delivered.all(axis=1))
     if problem.broken is not None:
         offset = (problem.goals_m - states[..., NORTH : EAST + 1])[:, problem.broken]
         done &= np.linalg.norm(offset, axis=1) <= problem.radius_m + SLACK_M
-    return float(done.mean())
+    return done

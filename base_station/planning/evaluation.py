@@ -75,13 +75,20 @@ def separation(reports: Array) -> Array:
     if reports.shape[1] < 2:
         raise ValueError("an experiment needs two hypotheses at least")
     moved = np.linalg.norm(reports - reports[:, :, :1], axis=-1, keepdims=True)
+    squares = pair_squares(reports[:, :, 1:], moved[:, :, 1:])
+    worst: Array = np.sqrt(squares.min(axis=1))
+    return worst
+
+
+def pair_squares(reports: Array, moved_m: Array) -> Array:
+    """d'^2 of every pair of hypotheses, [N, P], for reports [N, H, ..., 2] that have come
+    `moved_m` [N, H, ..., 1] from where they were."""
     squares = []
     for a, b in combinations(range(reports.shape[1]), 2):
-        sigma = REPORT_SIGMA_M + MODEL_ERROR * np.maximum(moved[:, a], moved[:, b])
-        ratio = ((reports[:, a] - reports[:, b]) / sigma)[:, 1:]
+        sigma = REPORT_SIGMA_M + MODEL_ERROR * np.maximum(moved_m[:, a], moved_m[:, b])
+        ratio = (reports[:, a] - reports[:, b]) / sigma
         squares.append((ratio**2).reshape(len(reports), -1).sum(axis=1))
-    worst: Array = np.sqrt(np.min(squares, axis=0))
-    return worst
+    return np.stack(squares, axis=1)
 
 
 def confusion(d_prime: Array) -> Array:

@@ -222,14 +222,15 @@ class TaskVecEnv(VecEnv):  # type: ignore[misc]
     def step_wait(self) -> tuple[Any, Any, Any, list[dict[str, Any]]]:
         step = self.task.step(self._actions)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        self._returns += step.rewards
+        rewards = step.rewards
+        self._returns += rewards
         for i in np.flatnonzero(step.dones):
             final = step.final_observations[i].astype(np.float32)
             infos[i] = {"terminal_observation": final, "TimeLimit.truncated": False}
             self._finished.append(float(self._returns[i]))
             self._returns[i] = 0.0
-        rewards = step.rewards.astype(np.float32)
-        return step.observations.astype(np.float32), rewards, step.dones, infos
+        observations = step.observations.astype(np.float32)
+        return observations, rewards.astype(np.float32), step.dones, infos
 
     def close(self) -> None:
         pass

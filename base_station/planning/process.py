@@ -17,7 +17,9 @@ import numpy as np
 from base_station.hypotheses import candidates
 from base_station.planning import ppo
 from base_station.planning.alpha import AlphaTask
-from base_station.planning.planner import alpha_problem, best_candidate, plan
+from base_station.planning.candidates import best_candidate
+from base_station.planning.planner import plan
+from base_station.planning.problems import alpha_problem
 from base_station.planning.requests import PlanRequest, decode, encode
 from base_station.twin import FleetModel, initial_state
 from hil.errors import InputError

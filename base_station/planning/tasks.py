@@ -15,13 +15,19 @@ class Step:
     """One control period of all E environments; those that are done have started anew.
 
     `observations` [E, O] are of the new episode where `dones` [E]; `final_observations` [E, O]
-    always of the old one. `rewards` [E].
+    always of the old one. `terms` are the named parts of the reward, each [E].
     """
 
     observations: Array
-    rewards: Array
+    terms: dict[str, Array]
     dones: Flags
     final_observations: Array
+
+    @property
+    def rewards(self) -> Array:
+        """[E]"""
+        total: Array = np.sum(list(self.terms.values()), axis=0)
+        return total
 
 
 class Task(Protocol):

@@ -8,18 +8,14 @@ import pytest
 
 from base_station.hypotheses import candidates, nominal
 from base_station.planning import planner
-from base_station.planning.alpha import AlphaTask, rho_alpha
+from base_station.planning.alpha import AlphaTask
 from base_station.planning.beta import BetaTask, nominal_starts, success_share
-from base_station.planning.planner import (
-    alpha_problem,
-    best_candidate,
-    beta_problem,
-    blocked_directions,
-    derived_seed,
-    plan,
-)
+from base_station.planning.candidates import best_candidate
+from base_station.planning.objectives import rho_alpha
+from base_station.planning.planner import derived_seed, plan
 from base_station.planning.policy import Commands, act, arrived, to_setpoints
 from base_station.planning.ppo import TUNED_ALPHA, TaskVecEnv, train
+from base_station.planning.problems import alpha_problem, beta_problem, blocked_directions
 from base_station.planning.requests import PlanRequest, PolicyWeights, encode
 from base_station.twin import (
     EAST,
