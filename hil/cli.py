@@ -79,6 +79,13 @@ def _replay(options: argparse.Namespace) -> int:
     return replay_run(options.logs, options.view)
 
 
+def _report(options: argparse.Namespace) -> int:
+    from hil.bench.report.write import write_report
+
+    print(write_report(options.run, options.out))
+    return 0
+
+
 def _check(options: argparse.Namespace) -> int:
     from hil.bench.check import describe, refuse_hopeless
 
@@ -176,6 +183,11 @@ def _parser() -> argparse.ArgumentParser:
     shot.add_argument("--view", metavar="NAME", help="a tab, or a view by its title's beginning")
     shot.add_argument("-o", "--out", type=Path, required=True, metavar="PNG")
     shot.set_defaults(command=_shot)
+
+    report = commands.add_parser("report", help="a page on a run, to open in a browser")
+    report.add_argument("run", type=Path, metavar="RUN", help="a run's folder")
+    report.add_argument("-o", "--out", type=Path, metavar="HTML", help="default RUN/report.html")
+    report.set_defaults(command=_report)
 
     replay = commands.add_parser("replay", help="diagnose recorded telemetry again")
     replay.add_argument(

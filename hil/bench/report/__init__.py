@@ -1,0 +1,1 @@
+"""`hil report`: what happened in a run, on one page that needs nothing else."""
