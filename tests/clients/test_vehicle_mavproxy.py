@@ -41,7 +41,7 @@ def console(ports: Ports, folder: Path) -> Console:
 
 def drive(prompt: Console) -> None:
     prompt.expect("Detected vehicle 2:1")
-    prompt.expect("Saved 40 parameters")
+    prompt.expect("parameters to ")
     for said, heard in (
         ("param set FS_TIMEOUT 7", None),
         ("mode GUIDED", "Mode GUIDED"),

@@ -48,13 +48,13 @@ def test_good_frames_do_change_something() -> None:
     assert all(driven(command) != UNDISTURBED for command in COMMANDS)
 
 
-@settings(max_examples=40)
+@settings(max_examples=40, deadline=None)
 @given(st.lists(st.binary(max_size=300), max_size=4))
 def test_random_bytes_change_nothing(datagrams: list[bytes]) -> None:
     assert driven(*datagrams) == UNDISTURBED
 
 
-@settings(max_examples=40)
+@settings(max_examples=40, deadline=None)
 @given(st.sampled_from(COMMANDS), st.data())
 def test_truncated_and_broken_frames_change_nothing(frame: bytes, data: st.DataObject) -> None:
     cut = frame[: data.draw(st.integers(0, len(frame) - 1))]
@@ -64,14 +64,14 @@ def test_truncated_and_broken_frames_change_nothing(frame: bytes, data: st.DataO
     assert driven(cut, wrong, signed) == UNDISTURBED
 
 
-@settings(max_examples=20)
+@settings(max_examples=20, deadline=None)
 @given(st.integers(1, 255).filter(lambda n: n != 2), st.sampled_from([0, 1]))
 def test_frames_for_other_systems_change_nothing(target: int, kind: int) -> None:
     other = (STATION.arm(target, False), STATION.set_mode_message(target, RoverMode.HOLD))[kind]
     assert driven(other) == UNDISTURBED
 
 
-@settings(max_examples=40)
+@settings(max_examples=40, deadline=None)
 @given(NOT_NUMBERS, st.integers(0, 3), st.sampled_from([1, 7, 8, 9]))
 def test_set_points_that_are_no_numbers_or_absurd_are_refused(
     bad: float, field: int, frame: int
@@ -86,7 +86,7 @@ def test_set_points_that_are_no_numbers_or_absurd_are_refused(
     assert driven(STATION.encode(setpoint)) == UNDISTURBED
 
 
-@settings(max_examples=20)
+@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 255).filter(lambda f: f not in (1, 7, 8, 9)))
 def test_unknown_frames_are_refused(frame: int) -> None:
     setpoint = LocalSetpoint(2, 1, 0.0, frame, 3527, None, (0.5, 0.5, 0.0), None, None)
@@ -97,7 +97,7 @@ def test_a_flood_of_heartbeats_changes_nothing() -> None:
     assert driven(*[STATION.gcs_heartbeat()] * 5000) == UNDISTURBED
 
 
-@settings(max_examples=60)
+@settings(max_examples=60, deadline=None)
 @given(
     st.integers(0, 65535),
     st.lists(st.floats(width=32), min_size=7, max_size=7),
@@ -117,7 +117,7 @@ def test_any_command_gets_one_ack_and_the_vehicle_goes_on(
     assert len(answers) == 2
 
 
-@settings(max_examples=40)
+@settings(max_examples=40, deadline=None)
 @given(NOT_NUMBERS, st.integers(0, 2), st.sampled_from([0, 3, 5, 6, 10, 11, 1, 99]))
 def test_global_set_points_that_cannot_be_meant_are_refused(
     bad: float, field: int, frame: int
@@ -128,7 +128,7 @@ def test_global_set_points_that_cannot_be_meant_are_refused(
     assert driven(STATION.encode(setpoint)) == UNDISTURBED
 
 
-@settings(max_examples=20)
+@settings(max_examples=20, deadline=None)
 @given(st.floats(-90, 90), st.floats(-180, 180))
 def test_points_on_the_other_side_of_the_globe_are_refused(lat: float, lon: float) -> None:
     assume(abs(lat - 47.4) > 2.0)
@@ -136,7 +136,7 @@ def test_points_on_the_other_side_of_the_globe_are_refused(lat: float, lon: floa
     assert driven(STATION.encode(setpoint)) == UNDISTURBED
 
 
-@settings(max_examples=20)
+@settings(max_examples=20, deadline=None)
 @given(st.lists(st.integers(-1000, 1000), min_size=4, max_size=4), st.integers(0, 255))
 def test_sticks_move_nothing_outside_manual(axes: list[int], target: int) -> None:
     x, y, z, r = (a / 1000 for a in axes)
@@ -158,7 +158,7 @@ ITEMS = st.builds(
 )
 
 
-@settings(max_examples=60)
+@settings(max_examples=60, deadline=None)
 @given(
     st.lists(
         st.one_of(
@@ -184,7 +184,7 @@ def test_whatever_is_uploaded_the_vehicle_drives_on(messages: list[MissionItem])
     assert len(answers) == 2
 
 
-@settings(max_examples=40)
+@settings(max_examples=40, deadline=None)
 @given(
     st.sampled_from([int(c) for c in Command]),
     st.lists(st.floats(width=32), min_size=5, max_size=5),
