@@ -7,6 +7,7 @@ import select
 import signal
 import sys
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import FrameType
@@ -24,6 +25,7 @@ from base_station.telemetry import Frame
 from base_station.watch import Baseline, Watch
 from hil.errors import HilError, InputError
 from hil.link import UdpLink
+from hil.options import Parser
 from hil.scenario import StationView, load_station_view
 
 STEP_S = 0.05  # 20 Hz when nothing arrives
@@ -33,12 +35,11 @@ class StopRequested(Exception):  # noqa: N818 - not an error
     """SIGTERM or SIGINT: stop tidily."""
 
 
-def main() -> None:
-    arguments = _arguments()
+def main(argv: Sequence[str] | None = None) -> None:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, _terminate)
     try:
-        run(arguments)
+        run(_arguments(argv))
     except StopRequested:
         sys.exit(0)
     except HilError as error:
@@ -46,8 +47,8 @@ def main() -> None:
         sys.exit(error.exit_code)
 
 
-def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
+def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
+    parser = Parser(
         prog="base-station",
         description="Find out what is broken in a fleet, over MAVLink, and finish its mission.",
     )
@@ -62,7 +63,7 @@ def _arguments() -> argparse.Namespace:
         help=f"stream to the Rerun viewer there, if one runs; without an address {VIEWER}",
     )
     parser.add_argument("--run-id", default=None, help="recording id, to share one recording")
-    return parser.parse_args()
+    return parser.parse_args(argv)
 
 
 def _terminate(_signal: int, _frame: FrameType | None) -> None:
@@ -73,12 +74,12 @@ def run(arguments: argparse.Namespace) -> None:
     """Raises InputError for a bad view or a busy port, ProcessDiedError when the planner dies."""
     view = load_station_view(arguments.view)
     say = _say_json if arguments.machine else _say_text
-    arguments.out.mkdir(parents=True, exist_ok=True)
     run_id = arguments.run_id or f"station-{os.getpid()}"
     with ExitStack() as stack:
         links = [_bind(view, member.mavlink_port) for member in view.fleet]
         for link in links:
             stack.callback(link.close)
+        _make_folder(arguments.out)
         planner = PlannerChild(arguments.view, arguments.out / "planner.log")
         stack.callback(planner.close)
         listeners = open_listeners(stack, arguments.out, run_id, view, arguments.viewer, say)
@@ -95,8 +96,17 @@ def _bind(view: StationView, port: int) -> UdpLink:
         return UdpLink.bind(view.host, port)
     except OSError as error:
         raise InputError(
-            f"port {view.host}:{port} (mavlink_port): {error.strerror}; "
-            "free it or choose another mavlink_port"
+            f"port {view.host}:{port} (host, mavlink_port): {error.strerror}; "
+            "stop who uses it, or change the view"
+        ) from None
+
+
+def _make_folder(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"--out {out}: cannot be created: {error.strerror}; choose another"
         ) from None
 
 

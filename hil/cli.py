@@ -2,14 +2,13 @@
 
 import argparse
 import json
-import math
 import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
 
-from hil.errors import HilError, InputError
+from hil.errors import HilError
+from hil.options import Parser, port, speed
 from hil.scenario import Scenario, load_scenario
 
 EXIT_BROKEN_PIPE = 128 + 13  # as a process that SIGPIPE ended
@@ -46,10 +45,13 @@ def _world(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from hil.bench.check import refuse_hopeless
     from hil.bench.run import RunOptions, run
 
+    scenario = _seeded_scenario(options)
+    refuse_hopeless(options.scenario, scenario)
     return run(
-        _seeded_scenario(options),
+        scenario,
         RunOptions(
             out=options.out,
             speed=options.speed,
@@ -112,20 +114,13 @@ def _seeded_scenario(options: argparse.Namespace) -> Scenario:
     return load_scenario(options.scenario, [*options.set, *seed])
 
 
-class _Parser(argparse.ArgumentParser):
-    """Reports bad options as all other bad input: one line, exit code 2."""
-
-    def error(self, message: str) -> NoReturn:
-        raise InputError(f"{message}; see `{self.prog} --help`")
-
-
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
+    parser = Parser(
         prog="hil", description="A testbed in which a fleet finds out for itself what is broken."
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    scenario = _Parser(add_help=False)
+    scenario = Parser(add_help=False)
     scenario.add_argument("scenario", type=Path, metavar="SCENARIO", help="a YAML file")
     scenario.add_argument(
         "--set",
@@ -134,18 +129,18 @@ def _parser() -> argparse.ArgumentParser:
         metavar="KEY.PATH=VALUE",
         help="override one value of the scenario; may be given more than once",
     )
-    timed = _Parser(add_help=False)
+    timed = Parser(add_help=False)
     timed.add_argument("--seed", type=int, help="instead of the scenario's")
     timed.add_argument(
         "--speed",
-        type=_speed,
+        type=speed,
         default=1.0,
         metavar="X",
         help="times real time; 0 is as fast as possible",
     )
 
     world = commands.add_parser("world", parents=[scenario, timed], help="simulate the world")
-    world.add_argument("--physics-port", type=int, metavar="P", help="of the first vehicle")
+    world.add_argument("--physics-port", type=port, metavar="P", help="of the first vehicle")
     world.add_argument("--host", help="address to listen on")
     world.add_argument("--truth", metavar="FILE", help="where to write the truth; - is stdout")
     world.add_argument(
@@ -169,7 +164,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--serve", action="store_true", help="offer a web viewer on this machine")
     run.set_defaults(command=_run)
 
-    recorded = _Parser(add_help=False)
+    recorded = Parser(add_help=False)
     recorded.add_argument("run", type=Path, metavar="RUN", help="a run's folder, or an .rrd file")
 
     view = commands.add_parser("view", parents=[recorded], help="open a run in the Rerun viewer")
@@ -207,13 +202,6 @@ def _parser() -> argparse.ArgumentParser:
     schema = commands.add_parser("schema", help="print the JSON schema of scenarios")
     schema.set_defaults(command=_schema)
     return parser
-
-
-def _speed(text: str) -> float:
-    value = float(text)  # argparse words the ValueError
-    if not math.isfinite(value) or value < 0.0:
-        raise argparse.ArgumentTypeError(f"{text}: must be finite and at least 0")
-    return value
 
 
 if __name__ == "__main__":

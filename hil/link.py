@@ -56,11 +56,11 @@ class UdpLink:
 
     @classmethod
     def bind(cls, host: str, port: int) -> Self:
-        """Wait for whoever speaks first. Raises OSError when the port is taken."""
+        """Wait for whoever speaks first. Raises OSError or OverflowError."""
         sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             sock.bind((host, port))
-        except OSError:
+        except (OSError, OverflowError):
             sock.close()
             raise
         return cls(sock, None)

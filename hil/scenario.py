@@ -28,14 +28,22 @@ from hil.faults import Fault, Type, Unit, refusal
 from hil.frames import Origin
 
 MAX_FILE_BYTES = 1_000_000
+MAX_SHOWN = 80  # characters of a wrong value in a message
 MIN_PUSH_MARGIN = 1.5
+MAX_PORT = 65_000
+PORTS_PER_VEHICLE = 10
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Probability = Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)]
 SysId = Annotated[int, Field(ge=1, le=249)]
-Port = Annotated[int, Field(ge=1024, le=65000)]
+GroundSysId = Annotated[int, Field(ge=1, le=254)]
+Port = Annotated[int, Field(ge=1024, le=MAX_PORT)]
+Metres = Annotated[float, Field(ge=-100_000, le=100_000)]  # the earth is flat within these
+Horizon = Annotated[float, Field(gt=0, le=600)]
+Seed = Annotated[int, Field(ge=0, le=2**31 - 1)]
+VehicleName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
 
 STATION_AIRFRAMES = ("omni_plus",)  # those that the station's twin can be
 
@@ -49,6 +57,13 @@ def _known_airframe(name: str) -> str:
 AirframeName = Annotated[
     str, AfterValidator(_known_airframe), Field(json_schema_extra={"enum": [*airframes.AIRFRAMES]})
 ]
+
+
+def _twinned_airframe(name: str) -> str:
+    if name not in STATION_AIRFRAMES:
+        known = ", ".join(STATION_AIRFRAMES)
+        raise ValueError(f"the base station has no twin of that; it knows {known}")
+    return name
 
 
 def _listed(value: Any) -> Any:
@@ -77,10 +92,10 @@ class OriginModel(Model):
 class Arena(Model):
     """A rectangle with solid walls."""
 
-    north_min_m: Finite
-    north_max_m: Finite
-    east_min_m: Finite
-    east_max_m: Finite
+    north_min_m: Metres
+    north_max_m: Metres
+    east_min_m: Metres
+    east_max_m: Metres
 
     @model_validator(mode="after")
     def _has_an_inside(self) -> Self:
@@ -96,8 +111,8 @@ class Arena(Model):
 
 
 class Point(Model):
-    north_m: Finite
-    east_m: Finite
+    north_m: Metres
+    east_m: Metres
 
 
 class Clock(Model):
@@ -139,7 +154,7 @@ class Radio(Model):
 
 
 class Vehicle(Model):
-    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
+    name: VehicleName
     sysid: SysId
     airframe: AirframeName = "omni_plus"
     start: Point
@@ -274,8 +289,8 @@ class Planning(Model):
     objective: Literal["paper_distance", "paper_printed", "information"] = "paper_distance"
     preset: Literal["tuned", "paper"] = "tuned"
     suspect: Literal["held", "commanded"] = "held"
-    alpha_horizon_s: Positive = 8.0
-    beta_horizon_s: Positive = 40.0
+    alpha_horizon_s: Horizon = 8.0
+    beta_horizon_s: Horizon = 40.0
     restarts: Annotated[int, Field(ge=0, le=100)] = 20
     planning_sim_s: NonNegative = 2.0
 
@@ -297,8 +312,8 @@ class Links(Model):
     mavlink_port_base: Port | None = None
     physics_port_base: Port | None = None
     injector_port_base: Port | None = None
-    station_sysid: Annotated[int, Field(ge=1, le=254)] = 250
-    injector_sysid: Annotated[int, Field(ge=1, le=254)] = 251
+    station_sysid: GroundSysId = 250
+    injector_sysid: GroundSysId = 251
 
 
 GoalOutcome = Literal["reached", "uncertain", "unreached"]
@@ -316,9 +331,9 @@ class Expectation(Model):
 class FleetMember(Model):
     """What the station knows of a vehicle."""
 
-    name: str
+    name: VehicleName
     sysid: SysId
-    airframe: str
+    airframe: Annotated[str, AfterValidator(_twinned_airframe)]
     start_yaw_deg: Finite
     goal: Point
     mavlink_port: Port
@@ -335,20 +350,31 @@ class StationView(Model):
     arena: Arena
     yaw: Literal["locked", "free"]
     clock: Clock
-    fleet: tuple[FleetMember, ...]
+    fleet: Annotated[tuple[FleetMember, ...], Field(min_length=1, max_length=100)]
     sensors: Sensors
     diagnosis: Diagnosis
     planning: Planning
     limits: Limits
     host: str
-    station_sysid: int
-    station_seed: int
+    station_sysid: GroundSysId
+    station_seed: Seed
+
+    @model_validator(mode="after")
+    def _hangs_together(self) -> Self:
+        sysids = [m.sysid for m in self.fleet]
+        _unique("fleet.sysid", sysids)
+        _unique("fleet.name", [m.name for m in self.fleet])
+        _unique("fleet.mavlink_port", [m.mavlink_port for m in self.fleet])
+        if self.station_sysid in sysids:
+            raise ValueError(f"station_sysid = {self.station_sysid} is also a vehicle's")
+        _keep_inside(self.arena, "goal", self.fleet)
+        return self
 
 
 class Scenario(Model):
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$")]
     description: str = ""
-    seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = 0
+    seed: Seed = 0
     origin: OriginModel = OriginModel()
     arena: Arena
     yaw: Literal["locked", "free"] = "locked"
@@ -375,13 +401,10 @@ class Scenario(Model):
                 raise ValueError(f"links.{role} = {getattr(self.links, role)} is also a vehicle's")
         if self.links.station_sysid == self.links.injector_sysid:
             raise ValueError("links.station_sysid and links.injector_sysid must differ")
-        for i, v in enumerate(self.fleet):
-            for field in ("start", "goal"):
-                if not self.arena.contains(getattr(v, field), v.frame.radius_m):
-                    raise ValueError(
-                        f"fleet.{i}.{field} of {v.name} is outside the arena less the vehicle's "
-                        f"radius of {v.frame.radius_m} m; move it inside"
-                    )
+        self._check_ports()
+        _keep_inside(self.arena, "start", self.fleet)
+        _keep_inside(self.arena, "goal", self.fleet)
+        for v in self.fleet:
             if self.yaw == "locked" and not v.frame.axis_motors("y") and not v.frame.flight:
                 raise ValueError(
                     f"{v.name} is a {v.airframe}, which must turn to go sideways; yaw: free lets it"
@@ -399,6 +422,16 @@ class Scenario(Model):
             if sysid not in sysids:
                 raise ValueError(f"expect names vehicle {sysid}; the fleet has {sysids}")
         return self
+
+    def _check_ports(self) -> None:
+        count = len(self.fleet)
+        for role in ("mavlink_port_base", "physics_port_base", "injector_port_base"):
+            base = getattr(self.links, role)
+            if base is not None and (last := base + PORTS_PER_VEHICLE * (count - 1)) > MAX_PORT:
+                raise ValueError(
+                    f"links.{role} = {base}: {count} vehicles need ports up to {last}; the limit "
+                    f"is {MAX_PORT}; choose a lower base"
+                )
 
     def _check_fault(self, where: str, fault: FaultModel) -> None:
         sysids = [v.sysid for v in self.fleet]
@@ -424,6 +457,15 @@ def _unique(where: str, values: Sequence[object]) -> None:
             raise ValueError(f"{where} = {value!r} is used more than once; make each unique")
 
 
+def _keep_inside(arena: Arena, field: str, fleet: Sequence[Vehicle | FleetMember]) -> None:
+    for i, v in enumerate(fleet):
+        if not arena.contains(getattr(v, field), v.frame.radius_m):
+            raise ValueError(
+                f"fleet.{i}.{field} of {v.name} is outside the arena less the vehicle's "
+                f"radius of {v.frame.radius_m} m; move it inside"
+            )
+
+
 def _pairs(fleet: Sequence[Vehicle]) -> list[tuple[Vehicle, Vehicle]]:
     return [(a, b) for i, a in enumerate(fleet) for b in fleet[i + 1 :]]
 
@@ -446,7 +488,7 @@ def station_view(scenario: Scenario, mavlink_port_base: int, station_seed: int) 
             airframe=v.airframe,
             start_yaw_deg=v.start_yaw_deg,
             goal=v.goal,
-            mavlink_port=mavlink_port_base + 10 * i,
+            mavlink_port=mavlink_port_base + PORTS_PER_VEHICLE * i,
         )
         for i, v in enumerate(scenario.fleet)
     )
@@ -494,13 +536,17 @@ def _one_line(error: ValidationError) -> str:
     where = ".".join(str(part) for part in first["loc"]) or "scenario"
     message = first["msg"].removeprefix("Value error, ")
     value = first.get("input")
-    shown = "" if isinstance(value, dict | list | tuple | Model) else f" = {value!r}"
+    shown = "" if isinstance(value, dict | list | tuple | Model) else f" = {_short(repr(value))}"
     remedy = {
         "extra_forbidden": "; remove it, or see `hil schema` for the keys there are",
         "missing": "; add it, see `hil schema`",
     }.get(first["type"], "")
     more = f" (and {len(rest)} more)" if rest else ""
     return f"{where}{shown}: {message[0].lower()}{message[1:]}{remedy}{more}"
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}..."
 
 
 class _StrictLoader(yaml.SafeLoader):
@@ -532,7 +578,9 @@ def _read_map(path: Path) -> dict[str, Any]:
         tree = yaml.load(raw.decode("utf-8"), _StrictLoader)  # a SafeLoader
     except UnicodeDecodeError:
         raise InputError(f"{path}: not UTF-8 text; a scenario is a YAML file") from None
-    except (yaml.YAMLError, RecursionError) as error:
+    except RecursionError:
+        raise InputError(f"{path}: not valid YAML: nested too deeply") from None
+    except (yaml.YAMLError, ValueError) as error:  # a date or number that cannot be is a ValueError
         raise InputError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from None
     if not isinstance(tree, dict):
         kind = {type(None): "empty", list: "a list"}.get(type(tree), "a single value")
@@ -545,9 +593,9 @@ def _apply_override(tree: dict[str, Any], override: str) -> None:
     if not equals or not key_path:
         raise InputError(f"--set {override}: must be key.path=value, as in --set seed=3")
     try:
-        value = yaml.safe_load(text)
-    except yaml.YAMLError:
-        raise InputError(f"--set {override}: the value is not valid YAML") from None
+        value = yaml.load(text, _StrictLoader)  # a SafeLoader
+    except (yaml.YAMLError, ValueError, RecursionError):
+        raise InputError(f"--set {_short(override)}: the value is not valid YAML") from None
     *parents, last = key_path.split(".")
     node: Any = tree
     for key in parents:
@@ -561,7 +609,7 @@ def _apply_override(tree: dict[str, Any], override: str) -> None:
 
 def _child(node: Any, key: str, override: str) -> Any:
     if isinstance(node, list):
-        if key.isdigit() and int(key) < len(node):
+        if key.isdecimal() and int(key) < len(node):
             return node[int(key)]
         raise InputError(f"--set {override}: {key} is not an index below {len(node)}")
     if isinstance(node, dict):

@@ -24,14 +24,14 @@ from hil.link import (
     UdpLink,
 )
 from hil.mavlink import Decoder, Signing, key_of, ticks
+from hil.options import Parser, port
 from hil.physics_link import PhysicsState
-from hil.scenario import Scenario, load_scenario
+from hil.scenario import PORTS_PER_VEHICLE, Scenario, load_scenario
 from sim_vehicles.parameter_file import restored, written
 from sim_vehicles.physics_end import PhysicsEnd
 from sim_vehicles.vehicle import Vehicle
 
 REPEAT_AFTER_S = 1.0
-PORT_STEP = 10
 
 
 class StopRequested(Exception):  # noqa: N818 - not an error
@@ -39,8 +39,8 @@ class StopRequested(Exception):  # noqa: N818 - not an error
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    arguments = _parser().parse_args(argv)
     try:
+        arguments = _parser().parse_args(argv)
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, _terminate)
         run(arguments)
@@ -55,21 +55,21 @@ def _terminate(_signal: int, _frame: FrameType | None) -> None:
     raise StopRequested
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def _parser() -> Parser:
+    parser = Parser(
         prog="sim-vehicle",
         description="One simulated vehicle: speaks MAVLink as ArduPilot Rover does.",
     )
     parser.add_argument("scenario", type=Path)
     parser.add_argument("--sysid", type=int, required=True, help="which vehicle of the fleet")
     parser.add_argument("--host", help="where world and station are (default: links.host)")
-    parser.add_argument("--physics-port", type=_port, metavar="P", help=_default(PHYSICS_PORT_BASE))
-    parser.add_argument("--mavlink-port", type=_port, metavar="P", help=_default(MAVLINK_PORT_BASE))
+    parser.add_argument("--physics-port", type=port, metavar="P", help=_default(PHYSICS_PORT_BASE))
+    parser.add_argument("--mavlink-port", type=port, metavar="P", help=_default(MAVLINK_PORT_BASE))
     parser.add_argument(
-        "--injector-port", type=_port, metavar="P", help=_default(INJECTOR_PORT_BASE)
+        "--injector-port", type=port, metavar="P", help=_default(INJECTOR_PORT_BASE)
     )
     parser.add_argument(
-        "--listen-port", type=_port, metavar="P", default=0, help="where other stations find it"
+        "--listen-port", type=port, metavar="P", default=0, help="where other stations find it"
     )
     parser.add_argument("--params", type=Path, metavar="FILE", help="keep changed parameters there")
     parser.add_argument(
@@ -80,15 +80,8 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _port(text: str) -> int:
-    port = int(text)  # argparse words the ValueError
-    if not 1 <= port <= 65535:
-        raise argparse.ArgumentTypeError(f"{text}: a port is 1 to 65535")
-    return port
-
-
 def _default(base: int) -> str:
-    return f"default: {base} + {PORT_STEP} x place in the fleet, or as the scenario's links say"
+    return f"default: {base} + {PORTS_PER_VEHICLE} x place in the fleet, or by the scenario's links"
 
 
 @dataclass(frozen=True)
@@ -104,7 +97,7 @@ def ports_of(scenario: Scenario, arguments: argparse.Namespace) -> Ports:
     """Given on the command line, or else by the scenario's base and the place in the fleet."""
     links = scenario.links
     sysids = [v.sysid for v in scenario.fleet]
-    offset = PORT_STEP * sysids.index(arguments.sysid)
+    offset = PORTS_PER_VEHICLE * sysids.index(arguments.sysid)
     return Ports(
         arguments.physics_port or (links.physics_port_base or PHYSICS_PORT_BASE) + offset,
         arguments.mavlink_port or (links.mavlink_port_base or MAVLINK_PORT_BASE) + offset,

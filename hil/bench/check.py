@@ -2,12 +2,14 @@
 
 from pathlib import Path
 
+from base_station.hypotheses import candidates
 from hil.airframe import push_margin
 from hil.bench.onsets import Onsets
 from hil.bench.record import describe_fault
 from hil.errors import InputError
 from hil.faults import Unit
-from hil.scenario import MIN_PUSH_MARGIN, FaultModel, Scenario, Vehicle
+from hil.link import MAVLINK_PORT_BASE
+from hil.scenario import MIN_PUSH_MARGIN, FaultModel, Scenario, Vehicle, station_view
 
 AXES = ("x", "y")
 
@@ -36,10 +38,31 @@ def margin(scenario: Scenario, pushed: Vehicle, axis: str) -> float:
 
 
 def refuse_hopeless(path: Path, scenario: Scenario) -> None:
-    """Raises InputError when a rescue is expected for which the others are too weak.
+    """Raises InputError for an expectation that no run can meet."""
+    _refuse_unknown_hypothesis(path, scenario)
+    _refuse_weak_rescue(path, scenario)
 
-    A rescue: yaw is locked, all motors of a body axis are off, and yet that vehicle's goal shall
-    be reached.
+
+def _refuse_unknown_hypothesis(path: Path, scenario: Scenario) -> None:
+    expected = scenario.expect.hypothesis
+    if expected is None:
+        return
+    known = {
+        hypothesis.name
+        for member in station_view(scenario, MAVLINK_PORT_BASE, 0).fleet
+        for hypothesis in candidates(member, scenario.diagnosis.priors)
+    }
+    if expected not in known:
+        raise InputError(
+            f"{path}: expect.hypothesis = {expected!r}: no such hypothesis; "
+            f"there are {', '.join(sorted(known))}"
+        )
+
+
+def _refuse_weak_rescue(path: Path, scenario: Scenario) -> None:
+    """A rescue: yaw is locked, all motors of a body axis are off, yet that goal shall be reached.
+
+    It needs others who are strong enough.
     """
     if scenario.yaw != "locked":
         return

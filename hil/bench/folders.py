@@ -36,7 +36,7 @@ def choose_folders(scenario: Scenario, out: Path | None) -> Folders:
     """Names only; nothing is created. Raises InputError when `out` holds something already."""
     if out is None:
         out = _fresh(Path("runs") / f"{scenario.name}-{time.strftime('%Y%m%dT%H%M%S')}")
-    elif out.exists() and (not out.is_dir() or any(out.iterdir())):
+    elif _is_taken(out):
         raise InputError(f"--out {out}: exists and is not an empty folder; choose another")
     return Folders(out, out.absolute().parent / f".station-{secrets.token_hex(8)}")
 
@@ -47,7 +47,9 @@ def create_folders(folders: Folders) -> None:
         folders.run.mkdir(parents=True, exist_ok=True)
         folders.station.mkdir()
     except OSError as error:
-        raise InputError(f"--out {folders.run}: cannot be created: {error.strerror}") from None
+        raise InputError(
+            f"--out {folders.run}: cannot be created: {error.strerror}; choose another"
+        ) from None
 
 
 def pin_ports(scenario: Scenario, ports: PortBases) -> Scenario:
@@ -67,13 +69,12 @@ def blind_view(scenario: Scenario) -> StationView:
     return station_view(scenario, port_base, int(state[0]) & 0x7FFFFFFF)
 
 
-def write_inputs(scenario: Scenario, folders: Folders) -> None:
+def write_inputs(scenario: Scenario, view: StationView, folders: Folders) -> None:
     """The scenario as it is run, for world and vehicles; the view, for the station."""
     tree = scenario.model_dump(mode="json", exclude_none=True)
     text = yaml.safe_dump(tree, sort_keys=False, allow_unicode=True)
     (folders.run / SCENARIO_FILE).write_text(text, encoding="utf-8")
-    view = blind_view(scenario).model_dump_json(indent=2)
-    (folders.station / VIEW_FILE).write_text(view, encoding="utf-8")
+    (folders.station / VIEW_FILE).write_text(view.model_dump_json(indent=2), encoding="utf-8")
 
 
 def collect(folders: Folders) -> None:
@@ -89,6 +90,14 @@ def collect(folders: Folders) -> None:
             target = folders.run / f"station-{item.name}"
         shutil.move(item, target)
     folders.station.rmdir()
+
+
+def _is_taken(out: Path) -> bool:
+    """Raises InputError where one may not even look."""
+    try:
+        return out.exists() and (not out.is_dir() or any(out.iterdir()))
+    except OSError as error:
+        raise InputError(f"--out {out}: {error.strerror}; choose another") from None
 
 
 def _fresh(folder: Path) -> Path:

@@ -8,9 +8,8 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 
 from hil.errors import InputError
-from hil.scenario import Scenario
+from hil.scenario import PORTS_PER_VEHICLE, Scenario
 
-PORTS_PER_VEHICLE = 10
 _SEARCH = range(10_000, 32_000)  # below the range from which systems pick ports for clients
 _TRIES = 200
 

@@ -10,6 +10,7 @@ from types import FrameType
 from hil.bench.console import Console
 from hil.bench.folders import (
     Folders,
+    blind_view,
     choose_folders,
     collect,
     create_folders,
@@ -59,11 +60,12 @@ def run(scenario: Scenario, options: RunOptions, console: Console | None = None)
     folders = choose_folders(scenario, options.out)
     if not options.in_memory:
         scenario = pin_ports(scenario, choose_ports(scenario))
+    view = blind_view(scenario)
     with ExitStack() as stack:
         with _interruptible(), console or Console() as shown:
             create_folders(folders)
             try:
-                write_inputs(scenario, folders)
+                write_inputs(scenario, view, folders)
                 shown.begin(scenario, folders.run, _how(options))
                 viewer = _viewer(stack, options, shown)
                 record, failure = _attempt(scenario, folders, options, viewer, shown, onsets)

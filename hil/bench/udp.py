@@ -10,12 +10,11 @@ from hil.bench.injector import Breaker
 from hil.bench.leash import Leash
 from hil.bench.lines import STATION, parse_station_line
 from hil.bench.onsets import Onsets
-from hil.bench.ports import PORTS_PER_VEHICLE
 from hil.bench.processes import Child, Children, Command
 from hil.bench.runlog import RunLog
 from hil.bench.watchdog import Watchdog
 from hil.link import UdpLink
-from hil.scenario import Scenario
+from hil.scenario import PORTS_PER_VEHICLE, Scenario
 from hil.world.truth import TruthRecord, parse_line
 
 READY_WITHIN_S = 180.0  # the first start ever compiles kernels

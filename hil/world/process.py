@@ -6,7 +6,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, closing, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -40,25 +40,22 @@ def run_world(scenario: Scenario, options: WorldOptions) -> int:
     host = options.host or scenario.links.host
     base = options.physics_port or scenario.links.physics_port_base or PHYSICS_PORT_BASE
     ports = {v.sysid: base + 10 * i for i, v in enumerate(scenario.fleet)}
-    links = {sysid: _bind(host, port) for sysid, port in ports.items()}
     names = {v.sysid: f"{v.name} (sysid {v.sysid}, port {ports[v.sysid]})" for v in scenario.fleet}
-    try:
-        with _open_truth(options.truth) as file:
-            leash = Leash(0.0) if options.leash else None
-            simulation, pace = Simulation(scenario, scenario.seed), Pace(options.speed)
-            _Server(simulation, links, names, partial(_write_truth, file), pace, leash).serve()
-    finally:
-        for link in links.values():
-            link.close()
+    with ExitStack() as stack:
+        links = {sysid: _bind(stack, host, port) for sysid, port in ports.items()}
+        file = stack.enter_context(_open_truth(options.truth))
+        leash = Leash(0.0) if options.leash else None
+        simulation, pace = Simulation(scenario, scenario.seed), Pace(options.speed)
+        _Server(simulation, links, names, partial(_write_truth, file), pace, leash).serve()
     return 0
 
 
-def _bind(host: str, port: int) -> UdpLink:
+def _bind(stack: ExitStack, host: str, port: int) -> UdpLink:
     try:
-        return UdpLink.bind(host, port)
-    except OSError as error:
+        return stack.enter_context(closing(UdpLink.bind(host, port)))
+    except (OSError, OverflowError) as error:
         raise InputError(
-            f"physics port {host}:{port} cannot be bound: {error.strerror}; "
+            f"physics port {host}:{port} cannot be bound: {error}; "
             "choose another --physics-port, or stop who uses it"
         ) from None
 

@@ -36,15 +36,21 @@ def test_fleet_faults_and_margins_are_shown() -> None:
         assert words in text
 
 
+@pytest.mark.parametrize("command", ["check", "run"])
 def test_a_rescue_nobody_can_give_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    command: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.chdir(tmp_path)
     path = tmp_path / "alone.yaml"
     path.write_text(yaml.safe_dump(alone().model_dump(mode="json", exclude_none=True)))
-    assert main(["check", str(path)]) == 2
+    assert main([command, str(path)]) == 2
     line = capsys.readouterr().err
     assert "rover_2 cannot be rescued: the push margin along body y is 0.00" in line
     assert line.count("\n") == 1
+    assert list(tmp_path.iterdir()) == [path]
 
 
 @pytest.mark.parametrize(
@@ -60,6 +66,11 @@ def test_a_rescue_nobody_can_give_is_refused(
 )
 def test_what_is_no_rescue_passes(scenario: Scenario) -> None:
     refuse_hopeless(Path("x.yaml"), scenario)
+
+
+def test_a_hypothesis_nobody_has_is_refused() -> None:
+    with pytest.raises(InputError, match=r"expect.hypothesis = 'motor_z_off': .* motor_y_off"):
+        refuse_hopeless(Path("x.yaml"), rescue("expect.hypothesis=motor_z_off"))
 
 
 def test_an_unreadable_onset_is_refused() -> None:

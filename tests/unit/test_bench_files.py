@@ -63,7 +63,7 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_station_folder_tells_nothing(folders: Folders) -> None:
-    write_inputs(rescue(), folders)
+    write_inputs(rescue(), blind_view(rescue()), folders)
     assert "rescue" not in folders.station.name
     assert folders.run_id in folders.station.name
     assert [p.name for p in folders.station.iterdir()] == ["view.json"]
@@ -72,7 +72,7 @@ def test_the_station_folder_tells_nothing(folders: Folders) -> None:
 
 def test_inputs_read_back_as_they_were(folders: Folders) -> None:
     scenario = pin_ports(rescue("seed=3"), PortBases(14000, 15000, 16000))
-    write_inputs(scenario, folders)
+    write_inputs(scenario, blind_view(scenario), folders)
     assert load_scenario(folders.run / "scenario.yaml") == scenario
     view = load_station_view(folders.station / "view.json")
     assert [m.mavlink_port for m in view.fleet] == [15000, 15010, 15020]

@@ -24,7 +24,9 @@ BAD_FILES: dict[str, tuple[bytes | None, str]] = {
     "scalar": (b"7", "is a single value"),
     "key twice": (b"name: a\nname: b\n", "given twice"),
     "alias": (b"a: &x 1\nb: *x\n", "aliases"),
-    "deep": (b"[" * 5000, "not valid YAML"),
+    "deep": (b"[" * 5000, "nested too deeply"),
+    "no such day": (b"name: 2020-13-45\n", "not valid YAML"),
+    "endless number": (b"seed: " + b"9" * 5000, "not valid YAML"),
     "large": (b"#" * 1_000_001, "the limit is"),
     "python object": (b"a: !!python/object/apply:os.getcwd []", "not valid YAML"),
 }
@@ -46,6 +48,14 @@ BAD_VALUES: dict[str, tuple[Edit, str]] = {
     "start in a wall": (lambda t: t["fleet"][0]["start"].update(east_m=-4.9), "outside the arena"),
     "starts overlap": (lambda t: t["fleet"][0]["start"].update(east_m=-0.5), "inside each other"),
     "no fleet": (lambda t: t.update(fleet=[]), "fleet"),
+    "goal beyond the horizon": (
+        lambda t: t["fleet"][0]["goal"].update(north_m=1e308),
+        "fleet.0.goal.north_m = 1e+308",
+    ),
+    "ports run out": (
+        lambda t: t.update(links={"mavlink_port_base": 65_000}),
+        "3 vehicles need ports up to 65020; the limit is 65000",
+    ),
     "empty arena": (lambda t: t["arena"].update(north_max_m=-9.0), "arena is empty"),
     "fault of a stranger": (lambda t: t["faults"][0].update(vehicle=9), "not in the fleet"),
     "fault of motor 5": (lambda t: t["faults"][0].update(instances=[5]), "the highest is 4"),
@@ -70,6 +80,10 @@ BAD_OVERRIDES = {
     "index too high": ("fleet.7.sysid=3", "not an index"),
     "inside a value": ("yaw.x=3", "inside a plain value"),
     "not YAML": ("seed=[", "not valid YAML"),
+    "no such day": ("seed=2020-13-45", "not valid YAML"),
+    "endless number": (f"seed={'9' * 5000}", "999...: the value is not valid YAML"),
+    "deep": (f"seed={'[' * 5000}", "not valid YAML"),
+    "digit that is no number": ("fleet.\u00b2.sysid=3", "not an index"),
     "wrong kind": ("seed=many", "seed"),
 }
 
@@ -136,11 +150,34 @@ def test_bad_overrides(
 
 @pytest.mark.parametrize(
     "option",
-    [("--speed", "-1"), ("--speed", "nan"), ("--speed", "fast"), ("--seed", "x"), ("--colour",)],
-    ids=" ".join,
+    [
+        ("--speed", "-1"),
+        ("--speed", "nan"),
+        ("--speed", "1e-320"),
+        ("--speed", "fast"),
+        ("--seed", "x"),
+        ("--seed", "9" * 5000),
+        ("--colour",),
+        ("--out", "x" * 300),
+    ],
+    ids=lambda option: " ".join(option)[:20],
 )
 def test_bad_options(option: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     assert option[0] in refused(capsys, "run", str(RESCUE), *option)
+
+
+def test_what_the_station_has_no_twin_of_is_refused_before_anything_is_made(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    argv = ("run", str(RESCUE), "--set", "fleet.0.airframe=quad_x", "--out", str(out))
+    assert "rover_1 is a quad_x" in refused(capsys, *argv)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("port", ["-1", "65530", "99999"])
+def test_a_world_refuses_ports_there_are_not(port: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "port" in refused(capsys, "world", str(RESCUE), "--physics-port", port)
 
 
 def test_overrides_reach_nested_values_and_lists() -> None:

@@ -1,0 +1,32 @@
+"""Options on a command line: bad ones are reported as all other bad input is."""
+
+import argparse
+from typing import NoReturn
+
+from hil.errors import InputError
+
+MIN_SPEED, MAX_SPEED = 0.01, 1000.0
+
+
+class Parser(argparse.ArgumentParser):
+    """Raises InputError instead of printing its usage."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message}; see `{self.prog} --help`")
+
+
+def port(text: str) -> int:
+    """A UDP port."""
+    value = int(text)  # argparse words the ValueError
+    if not 1 <= value <= 65535:
+        raise argparse.ArgumentTypeError(f"{text}: a port is 1 to 65535")
+    return value
+
+
+def speed(text: str) -> float:
+    """Times real time; 0 is as fast as possible."""
+    value = float(text)
+    if value != 0.0 and not MIN_SPEED <= value <= MAX_SPEED:
+        limits = f"0, or {MIN_SPEED:g} to {MAX_SPEED:g}"
+        raise argparse.ArgumentTypeError(f"{text}: must be {limits}")
+    return value
