@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 
 DIRECTIONS = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 PUSHES_S = (1.0, 2.0, 3.0)
+TOUCH_M = 0.1
 
 
 def ram(problem: AlphaProblem, rng: np.random.Generator) -> Proposals:  # noqa: ARG001
@@ -33,14 +34,18 @@ def _script(
     states = problem.start[None].copy()
     memory = problem.objective.begin(problem.reports(states))
     actions = np.zeros((problem.steps, commands.size))
-    left = round(push_s / problem.period_s)
+    reach = float(radius[helper] + radius[problem.suspect])
+    left = pushes = round(push_s / problem.period_s)
     way = np.array([direction])
     for k in range(problem.steps):
         position = states[:, 0, :, NORTH : EAST + 1]
-        reach = float(radius[helper] + radius[problem.suspect])
-        velocity, ready = get_behind(position[:, helper], position[:, problem.suspect], way, reach)
-        if ready[0] or left < round(push_s / problem.period_s):
+        here, there = position[:, helper], position[:, problem.suspect]
+        velocity, ready = get_behind(here, there, way, reach)
+        touches = np.linalg.norm(here - there) <= reach + TOUCH_M
+        if left < pushes or (ready[0] and touches):
             velocity, left = way * (left > 0), left - 1
+        elif ready[0]:
+            velocity = way
         speed = max(1.0, float(np.linalg.norm(velocity)))
         actions[k, slot : slot + 2] = velocity[0] / speed
         setpoints = to_setpoints(actions[None, k], commands)

@@ -18,6 +18,7 @@ from base_station.planning.ram import ram
 from base_station.planning.requests import encode
 from base_station.planning.search import LOOK_EVERY, ROUND, search
 from base_station.planning.shooting import shooting, stretched
+from base_station.planning.stepwise import stepwise
 from base_station.twin import NORTH, initial_state
 
 
@@ -60,6 +61,14 @@ def test_a_missed_target_is_tried_again_with_another_seed(rescue_view, monkeypat
     assert [(t.attempt, t.accepted) for t in answer.trainings] == [(0, False), (1, False)]
     assert answer.trainings[0].curve != answer.trainings[1].curve
     assert encode(answer)
+
+
+def test_a_ram_comes_from_afar_and_random_steps_do_not(rescue_view):
+    request = experiment(rescue_view, apart_m=4.3)
+    assert answered(rescue_view, "ram", request).plan is not None
+    problem = alpha_problem(rescue_view, request)
+    aimless = next(stepwise(problem, np.random.default_rng(0)))
+    assert nominal_returns(problem, aimless).max() <= 0.0
 
 
 def test_the_budget_is_kept(rescue_view):
