@@ -7,7 +7,7 @@ in this testbed motor faults are silent.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from hil.airframe import Airframe, Battery
+from hil.airframe import Airframe, Battery, Motor
 
 STANDARD = Battery()
 
@@ -40,7 +40,12 @@ def drain(battery: BatteryState, outputs: Sequence[float], dt_s: float) -> Batte
     return replace(battery, voltage_v=voltage_v, current_a=current_a, consumed_mah=consumed)
 
 
-def loads(airframe: Airframe, outputs: Sequence[float]) -> tuple[float, ...]:
+def loads(airframe: Airframe, outputs: Sequence[float | None]) -> tuple[float, ...]:
     """Motor outputs as shares of full load (0..1): a rotor has its zero at -1."""
-    pairs = zip(airframe.motors, outputs, strict=True)
-    return tuple(abs(u) if m.reversible else (u + 1.0) / 2.0 for m, u in pairs)
+    return tuple(_load(m, u) for m, u in zip(airframe.motors, outputs, strict=True))
+
+
+def _load(motor: Motor, output: float | None) -> float:
+    if output is None:
+        return 0.0
+    return abs(output) if motor.reversible else (output + 1.0) / 2.0

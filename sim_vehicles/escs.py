@@ -6,9 +6,9 @@ telemetry itself is what `EscDamage` says.
 
 from collections.abc import Sequence
 
-from hil.airframe import pwm_to_output
+from hil.airframe import Airframe, pwm_to_output
 from hil.mavlink import Esc, EscTelemetry
-from sim_vehicles.battery import BatteryState
+from sim_vehicles.battery import BatteryState, loads
 from sim_vehicles.damage import EscDamage
 
 FULL_RPM = 3000  # at full output, without load
@@ -18,14 +18,18 @@ _ABSENT = Esc(0, 0.0, 0.0, 0, 0, 0)
 
 
 def esc_telemetry(
-    pwm_us: Sequence[int], damage: Sequence[EscDamage], battery: BatteryState, now_s: float
+    airframe: Airframe,
+    pwm_us: Sequence[int],
+    damage: Sequence[EscDamage],
+    battery: BatteryState,
+    now_s: float,
 ) -> EscTelemetry:
     """Of the first four motors. The charge is an equal share of what the battery has given."""
     share_mah = round(battery.consumed_mah / max(1, len(damage)))
     escs = []
-    for pwm, broken in zip(pwm_us, damage, strict=False):
-        output = abs(pwm_to_output(pwm) or 0.0)
-        rpm, amps = round(broken.gain * output * FULL_RPM), output * battery.pack.motor_a
+    shares = loads(airframe, [pwm_to_output(pwm) for pwm in pwm_us[: len(damage)]])
+    for share, broken in zip(shares, damage, strict=True):
+        rpm, amps = round(broken.gain * share * FULL_RPM), share * battery.pack.motor_a
         count = int(now_s * REPORTS_HZ)
         sound = Esc(rpm, battery.voltage_v, amps, share_mah, WARM_DEGC, count)
         escs.append(_ABSENT if broken.off else sound)

@@ -13,6 +13,7 @@ from hil.airframe import mix, output_to_pwm
 from hil.frames import wrap_pi
 from hil.mavlink import (
     CopterMode,
+    EscTelemetry,
     FenceStatus,
     Heartbeat,
     HomePosition,
@@ -438,11 +439,15 @@ class Vehicle:
             fence=self._fence(),
             inertial=self._sample,
             innovation=self._innovation,
-            escs=esc_telemetry(self._pwm, self._failures.active.escs, self._battery, now_s),
+            escs=self._escs(now_s),
             sticks=self._piloting.sticks,
             flies=self._drive.airframe.flight is not None,
             landed=self._landed_state(),
         )
+
+    def _escs(self, now_s: float) -> EscTelemetry:
+        damage, airframe = self._failures.active.escs, self._drive.airframe
+        return esc_telemetry(airframe, self._pwm, damage, self._battery, now_s)
 
     def _fence(self) -> FenceStatus | None:
         return self._breaches.status() if self._parameters["FENCE_ENABLE"] else None

@@ -13,8 +13,10 @@ from hil.mavlink import (
     Command,
     CommandAck,
     CopterMode,
+    EscTelemetry,
     ExtendedSysState,
     Heartbeat,
+    MessageId,
     Result,
 )
 
@@ -214,3 +216,21 @@ def test_a_rotor_cannot_be_reversed() -> None:
         world.tell(world.injector.param_set(1, name, value), 1, "injector")
     world.tell(world.injector.inject_failure(1, Unit.MOTOR, 4, 1), 1, "injector")
     assert world.sent(CommandAck, 1, "injector")[-1].result == Result.DENIED
+
+
+def test_esc_telemetry_of_rotors_counts_from_throttle_zero() -> None:
+    def rpms(world: InWorld) -> list[int]:
+        world.clear()
+        world.tell(world.station.request_message(1, MessageId.ESC_TELEMETRY_1_TO_4))
+        return [esc.rpm for esc in world.sent(EscTelemetry)[-1].escs]
+
+    world = InWorld(scenario("quad_x"))
+    world.run(1.5)
+    assert rpms(world) == [0, 0, 0, 0]
+    world.guided()
+    world.run(1.0)
+    idle = rpms(world)
+    assert ordered(world, Command.NAV_TAKEOFF, 0, 0, 0, NAN, 0, 0, 5.0) == Result.ACCEPTED
+    world.run(10.0)
+    assert all(0 < low < 200 for low in idle)
+    assert all(1_200 < rpm < 2_400 for rpm in rpms(world))
