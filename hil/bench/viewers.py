@@ -71,7 +71,7 @@ def serve_web(recording: Path | None = None) -> Iterator[Viewer]:
         if not _up(process, [grpc, web]):
             raise HilError("the web viewer does not start")
         source = quote(f"rerun+http://{HOST}:{grpc}/proxy", safe="")
-        yield Viewer(f"{HOST}:{grpc}", f"http://{HOST}:{web}/?url={source}")
+        yield Viewer(f"{HOST}:{grpc}", f"http://{HOST}:{web}/?url={source}&theme=dark")
     finally:
         process.terminate()
         with suppress(subprocess.TimeoutExpired):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 import recorder_fake_run as fake
+from drawing import needs_vulkan
 
 from base_station.recorder import Recorder
 from base_station.recording.blueprint import TABS
@@ -13,12 +14,7 @@ from base_station.recording.screenshot import SIZE, Viewer, headless, screenshot
 from base_station.recording.truth import TruthRecorder
 from hil.errors import InputError
 
-DRIVERS = [
-    driver
-    for folder in ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d")
-    for driver in Path(folder).glob("*.json")
-]
-pytestmark = pytest.mark.skipif(not DRIVERS, reason="no Vulkan driver: no picture can be drawn")
+pytestmark = needs_vulkan
 
 
 @pytest.fixture(scope="module")
