@@ -1,7 +1,7 @@
 """The recorder: hears what the station tells and shows it in Rerun. It only listens.
 
-It never raises into the station and never waits for a viewer: the file is written at once, a
-viewer is fed by a thread that drops what it cannot deliver.
+It never raises into the station and never holds it up: the file is written by one thread, which
+loses nothing, and a viewer is fed by another, which drops what it cannot deliver.
 """
 
 from collections.abc import Callable, Mapping
@@ -12,7 +12,7 @@ from typing import Any
 from base_station.planning.requests import PlanProgress, PlanReady, Training
 from base_station.recording import streams
 from base_station.recording.blueprint import blueprint
-from base_station.recording.outlets import Channel, Inline, Queued
+from base_station.recording.outlets import UNLIMITED, Channel, Queued
 from base_station.recording.writer import Writer
 from base_station.records import Event, Snapshot
 from hil.scenario import StationView
@@ -28,7 +28,7 @@ class Recorder:
     def __init__(
         self, path: Path, run_id: str, view: StationView, viewer: str | None = None
     ) -> None:
-        self._channels = [Channel(Inline(), partial(_file_writer, path, run_id, view))]
+        self._channels = [Channel(Queued(UNLIMITED), partial(_file_writer, path, run_id, view))]
         if viewer:
             self._channels.append(Channel(Queued(), partial(_viewer_writer, viewer, run_id, view)))
 

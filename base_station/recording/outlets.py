@@ -10,6 +10,7 @@ from base_station.recording import streams
 
 LEAVE_S = 2.0
 QUEUE_LENGTH = 500
+UNLIMITED = 0
 
 Call = Callable[[], object]
 log = logging.getLogger(__name__)
@@ -34,12 +35,17 @@ class Inline:
 
 
 class Queued:
-    """Runs calls one after the other in a thread of its own, and drops them when it is behind."""
+    """Runs calls one after the other in a thread of its own.
 
-    def __init__(self) -> None:
+    With a limit it drops calls when so many wait, and closing gives up after `LEAVE_S`. With
+    `UNLIMITED` nothing is lost, and closing waits until all has run.
+    """
+
+    def __init__(self, limit: int = QUEUE_LENGTH) -> None:
         self.dropped = 0
+        self._leave_s = None if limit == UNLIMITED else LEAVE_S
         self._inline = Inline()
-        self._calls: queue.Queue[Call | None] = queue.Queue(QUEUE_LENGTH)
+        self._calls: queue.Queue[Call | None] = queue.Queue(limit)
         self._thread = threading.Thread(target=self._run, daemon=True, name="recorder")
         self._thread.start()
 
@@ -54,12 +60,12 @@ class Queued:
             self.dropped += 1
 
     def close(self) -> bool:
-        """Let it finish; False when it did not within `LEAVE_S`."""
+        """Let it finish; False when it did not."""
         try:
-            self._calls.put(None, timeout=LEAVE_S)
+            self._calls.put(None, timeout=self._leave_s)
         except queue.Full:
             return False
-        self._thread.join(LEAVE_S)
+        self._thread.join(self._leave_s)
         return not self._thread.is_alive()
 
     def _run(self) -> None:

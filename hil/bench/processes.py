@@ -15,6 +15,7 @@ from hil.errors import HilError, ProcessDiedError
 from hil.lifeline import dying_with_parent
 
 STOP_WITHIN_S = 3.0
+SHELL_TRACES = ("PWD", "OLDPWD", "_")
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,11 @@ class Command:
     log: Path
     cwd: Path | None = None
     takes_lines: bool = False
+
+
+def _environment() -> dict[str, str]:
+    """Ours without the traces of a shell: where that was may name the scenario to the station."""
+    return {name: value for name, value in os.environ.items() if name not in SHELL_TRACES}
 
 
 class Child:
@@ -44,6 +50,7 @@ class Child:
                 stdout=subprocess.PIPE,
                 stderr=log,
                 bufsize=0,
+                env=_environment(),
                 start_new_session=True,
                 preexec_fn=dying_with_parent(),
             )

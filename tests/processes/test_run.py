@@ -96,7 +96,11 @@ def test_a_run_leaves_the_whole_contract(tmp_path: Path) -> None:
     assert truth[-1]["time_s"] >= 2.0
 
 
-def test_nothing_handed_to_the_station_names_the_scenario(tmp_path: Path) -> None:
+def test_nothing_handed_to_the_station_names_the_scenario(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("PWD", "OLDPWD", "_"):
+        monkeypatch.setenv(name, "/home/somebody/rescue")
     out = tmp_path / "out"
     with child(*stub_run(out, "conclude")) as run:
         wait_line(run, PROBING)
@@ -107,9 +111,10 @@ def test_nothing_handed_to_the_station_names_the_scenario(tmp_path: Path) -> Non
         ]
         folder = os.readlink(f"/proc/{station}/cwd")
         log = os.readlink(f"/proc/{station}/fd/2")
+        environment = Path(f"/proc/{station}/environ").read_text()
         run.wait()
     arguments = (out / "station_was_here.txt").read_text()
-    for told in (folder, log, arguments, (out / "view.json").read_text()):
+    for told in (folder, log, arguments, environment, (out / "view.json").read_text()):
         assert "rescue" not in told
 
 

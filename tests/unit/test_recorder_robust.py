@@ -8,10 +8,12 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import recorder_fake_run as fake
@@ -19,8 +21,9 @@ import rerun as rr
 from recorder_reading import rows, temporal
 
 from base_station.recorder import Recorder
+from base_station.recording import streams
 from base_station.recording.merge import merge
-from base_station.recording.outlets import Queued
+from base_station.recording.outlets import QUEUE_LENGTH, UNLIMITED, Queued
 from base_station.records import Snapshot
 
 NOWHERE = (math.nan, math.nan)
@@ -88,6 +91,24 @@ def test_a_file_that_cannot_be_written_is_one_warning(
     assert "the run goes on" in caplog.text
 
 
+def test_a_slow_file_holds_up_nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    gate, to_file = threading.Event(), streams.to_file
+
+    def slow(*given: Any) -> Any:
+        assert gate.wait(10.0)
+        return to_file(*given)
+
+    monkeypatch.setattr(streams, "to_file", slow)
+    told = list(fake.snapshots())
+    recorder = Recorder(tmp_path / "a.rrd", "demo", fake.view())
+    for snapshot in told:
+        recorder.snapshot(snapshot)
+    gate.set()
+    recorder.close()
+    assert recorder.failures == 0
+    assert len(temporal(tmp_path / "a.rrd", "/fleet", "Cylinders3D:centers")) == len(told)
+
+
 def test_closing_twice_and_telling_after_it_are_harmless(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "a.rrd", "demo", fake.view())
     recorder.close()
@@ -109,8 +130,9 @@ def test_no_viewer_there_is_a_warning(tmp_path: Path, caplog: pytest.LogCaptureF
     assert temporal(tmp_path / "a.rrd", "/fleet", "Cylinders3D:centers")
 
 
-def test_a_queue_that_is_full_drops_and_does_not_wait() -> None:
-    outlet = Queued()
+@pytest.mark.parametrize("limit", [QUEUE_LENGTH, UNLIMITED])
+def test_a_queue_never_waits_and_drops_only_beyond_its_limit(limit: int) -> None:
+    outlet = Queued(limit)
     with socket.socket() as gate_in, socket.socket() as gate_out:
         gate_in.bind(("127.0.0.1", 0))
         gate_in.listen()
@@ -118,7 +140,8 @@ def test_a_queue_that_is_full_drops_and_does_not_wait() -> None:
         heard: list[int] = []
         for k in range(1000):
             outlet.put(lambda k=k: heard.append(k))  # type: ignore[misc]
-        assert outlet.dropped >= 499
+        assert (outlet.dropped >= 499) == (limit == QUEUE_LENGTH)
+        assert outlet.dropped == 0 or limit
         gate_out.connect(gate_in.getsockname())
         assert outlet.close()
     assert heard == list(range(1000 - outlet.dropped))
