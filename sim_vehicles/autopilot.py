@@ -32,7 +32,7 @@ class Target:
 
     Yaw is a heading in NED (rad), yaw rate in rad/s; None leaves the heading alone. A point may
     come with a speed not to exceed. What flies also climbs at `down_mps`, or goes to the height
-    `down_m` (both NED down).
+    `down_m` (both NED down), and may be told to leave the ground or to come down to it.
     """
 
     time_s: float
@@ -43,6 +43,8 @@ class Target:
     speed_mps: float | None = None
     down_mps: float = 0.0
     down_m: float | None = None
+    lifts: bool = False
+    lands: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,8 +142,10 @@ def check_target(state: Autopilot, now_s: float) -> Transition:
     return Transition(replace(state, target=None), texts=(text,) if state.armed else ())
 
 
-def check(state: Autopilot, which: Failsafe, tripped: bool, action: RoverMode | None) -> Transition:
-    """Trip a failsafe of an armed vehicle, or clear it.
+def check(
+    state: Autopilot, which: Failsafe, tripped: bool, action: RoverMode | None, flies: bool = False
+) -> Transition:
+    """Trip a failsafe of an armed vehicle, or clear it. What flies lands where others hold.
 
     It acts once, when it trips: `action` is the mode to go to, None only reports. Clearing does not
     bring the old mode back.
@@ -154,6 +158,8 @@ def check(state: Autopilot, which: Failsafe, tripped: bool, action: RoverMode | 
     if not state.armed:
         return Transition(state)
     does = "Report" if action is None else action.name.capitalize()
+    if flies and action is RoverMode.HOLD:
+        does = "Land"
     text = StatusText(Severity.WARNING, f"{which.value}: {does}")
     state = replace(state, tripped=state.tripped | {which})
     if action is not None and action is not state.mode:

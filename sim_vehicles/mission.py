@@ -27,9 +27,19 @@ _IN_A_LIST = {
     MissionType.FENCE: frozenset({*POLYGONS, *CIRCLES, Command.NAV_FENCE_RETURN_POINT}),
     MissionType.RALLY: frozenset({Command.NAV_RALLY_POINT}),
 }
+_IN_THE_AIR = frozenset({Command.NAV_TAKEOFF, Command.NAV_LAND})  # for what flies
 _WITHOUT_PLACE = frozenset(
-    {Command.NAV_RETURN_TO_LAUNCH, Command.NAV_DELAY, Command.DO_CHANGE_SPEED}
+    {
+        Command.NAV_RETURN_TO_LAUNCH,
+        Command.NAV_DELAY,
+        Command.DO_CHANGE_SPEED,
+        Command.NAV_TAKEOFF,  # straight up, as ArduPilot does
+    }
 )
+_WITH_HEIGHT = frozenset({Command.NAV_WAYPOINT, Command.NAV_LOITER_UNLIM, Command.NAV_TAKEOFF})
+_TO_THE_GROUND = frozenset({Command.NAV_LAND, Command.NAV_RETURN_TO_LAUNCH})
+_ABOVE_SEA = frozenset({GlobalFrame.GLOBAL, GlobalFrame.GLOBAL_INT})
+HEIGHT_REACHED_M = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +55,26 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Advance:
-    """The next progress, the point to drive to (None: stay), and the items done on the way."""
+    """The next progress, the point to drive to (None: stay), and the items done on the way.
+
+    `down_m` is the height to go to (None: as it is), for what flies.
+    """
 
     progress: Progress
     goal_m: Point | None = None
+    down_m: float | None = None
+    lifts: bool = False
+    lands: bool = False
     reached: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Air:
+    """Where what flies is, and its home: NED down (m)."""
+
+    here_down_m: float
+    home_down_m: float
+    landed: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +86,8 @@ class Surroundings:
     home_m: Point
     origin: Origin
     radius_m: float  # WP_RADIUS
+    air: Air | None = None
+    return_height_m: float = 0.0  # RTL_ALT
 
 
 def advance(items: Sequence[MissionItem], progress: Progress, around: Surroundings) -> Advance:
@@ -71,14 +98,34 @@ def advance(items: Sequence[MissionItem], progress: Progress, around: Surroundin
         item = items[progress.seq]
         goal_m = goal_of(item, around)
         progress = _arrive(item, progress, goal_m, around)
-        if not _is_done(item, progress, around.now_s):
-            return Advance(progress, goal_m, tuple(reached))
+        if not _is_done(item, progress, around):
+            return _towards(item, progress, around, tuple(reached))
         reached.append(progress.seq)
         speed = item.params[1] if item.command == Command.DO_CHANGE_SPEED else None
         progress = Progress(progress.seq + 1, None, speed or progress.speed_mps, started=True)
     ended = replace(progress, seq=max(0, len(items) - 1), complete=True)
-    last_m = goal_of(items[-1], around) if len(items) > 1 else None
-    return Advance(ended, last_m, tuple(reached))
+    if len(items) <= 1:
+        return Advance(ended, reached=tuple(reached))
+    return _towards(items[-1], ended, around, tuple(reached))
+
+
+def _towards(
+    item: MissionItem, progress: Progress, around: Surroundings, reached: tuple[int, ...]
+) -> Advance:
+    goal_m = goal_of(item, around)
+    if around.air is None:
+        return Advance(progress, goal_m, reached=reached)
+    lands = item.command in _TO_THE_GROUND and progress.arrived_s is not None
+    lifts = item.command == Command.NAV_TAKEOFF and not progress.complete
+    down_m = down_of(item, around.air, around.origin)
+    return Advance(progress, goal_m, down_m, lifts, lands, reached)
+
+
+def down_of(item: MissionItem, air: Air, origin: Origin) -> float | None:
+    """The height that an item wants, as NED down (m); None for that which it has."""
+    if item.command not in _WITH_HEIGHT:
+        return None
+    return (origin.alt_m if item.frame in _ABOVE_SEA else air.home_down_m) - item.z
 
 
 def goal_of(item: MissionItem, around: Surroundings) -> Point | None:
@@ -100,15 +147,24 @@ def _arrive(
         radius_m = item.params[1]
     if goal_m is not None and math.dist(goal_m, around.here_m) > radius_m:
         return progress
+    if around.air is not None and not _is_at_height(item, around.air, around.origin):
+        return progress
     return replace(progress, arrived_s=around.now_s)
 
 
-def _is_done(item: MissionItem, progress: Progress, now_s: float) -> bool:
+def _is_at_height(item: MissionItem, air: Air, origin: Origin) -> bool:
+    down_m = down_of(item, air, origin)
+    return down_m is None or abs(down_m - air.here_down_m) <= HEIGHT_REACHED_M
+
+
+def _is_done(item: MissionItem, progress: Progress, around: Surroundings) -> bool:
     if item.command == Command.NAV_LOITER_UNLIM or progress.arrived_s is None:
         return False
+    if around.air is not None and item.command in _TO_THE_GROUND:
+        return around.air.landed
     waits = item.command in (Command.NAV_WAYPOINT, Command.NAV_DELAY)
     hold_s = max(0.0, item.params[0]) if waits else 0.0
-    return now_s - progress.arrived_s >= hold_s - 1e-6
+    return around.now_s - progress.arrived_s >= hold_s - 1e-6
 
 
 def state_of(count: int, progress: Progress, running: bool) -> MissionState:
@@ -128,10 +184,12 @@ def tidied(item: MissionItem) -> MissionItem:
     return replace(item, params=(p1, p2, p3, p4), z=0.0 if math.isnan(item.z) else item.z)
 
 
-def refusal(item: MissionItem, origin: Origin) -> MissionResult | None:
+def refusal(item: MissionItem, origin: Origin, flies: bool = False) -> MissionResult | None:
     """Why an item can't be taken (it is `tidied`), or None."""
     home = item.mission_type == MissionType.MISSION and item.seq == 0
-    if item.command not in _IN_A_LIST.get(MissionType(item.mission_type), ()) and not home:
+    known = item.command in _IN_A_LIST.get(MissionType(item.mission_type), ())
+    flown = flies and item.mission_type == MissionType.MISSION and item.command in _IN_THE_AIR
+    if not (known or flown or home):
         return MissionResult.UNSUPPORTED
     for p, result in zip(
         item.params, (MissionResult.INVALID_PARAM1, MissionResult.INVALID_PARAM2), strict=False
@@ -141,6 +199,8 @@ def refusal(item: MissionItem, origin: Origin) -> MissionResult | None:
     if not math.isfinite(sum(item.params)):
         return MissionResult.INVALID
     if not math.isfinite(item.z):
+        return MissionResult.INVALID_PARAM7
+    if flies and abs(item.z) > MAX_DISTANCE_M:
         return MissionResult.INVALID_PARAM7
     if home or item.command in _WITHOUT_PLACE:
         return None

@@ -2,10 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from hil.frames import Origin, wgs84_to_ned
 from hil.mavlink import (
+    Command,
+    GlobalFrame,
     Message,
     MissionCurrent,
     MissionItem,
@@ -18,19 +20,59 @@ from hil.mavlink import (
 )
 from sim_vehicles.autopilot import Target
 from sim_vehicles.fence import Circle, Zone, breached, zones_of
-from sim_vehicles.mission import Point, Progress, Surroundings, advance, state_of
+from sim_vehicles.mission import (
+    Advance,
+    Air,
+    Point,
+    Progress,
+    Surroundings,
+    advance,
+    state_of,
+)
 
 Items = tuple[MissionItem, ...]
 CIRCLE_BIT, ZONES_BIT = 2, 4  # FENCE_TYPE
 
 
+@dataclass(frozen=True, slots=True)
+class Return:
+    """The way home of what flies."""
+
+    items: Items
+    progress: Progress
+
+    @classmethod
+    def begun(cls, height_m: float, air: Air) -> "Return":
+        """On the ground there is nothing to do."""
+        rise = max(height_m, air.home_down_m - air.here_down_m)
+        commands = () if air.landed else (Command.NAV_TAKEOFF, Command.NAV_RETURN_TO_LAUNCH)
+        rows = enumerate((Command.NAV_WAYPOINT, *commands))
+        frame, none = GlobalFrame.GLOBAL_RELATIVE_ALT, (0.0,) * 4
+        items = tuple(MissionItem(0, 0, i, frame, c, none, 0, 0, rise) for i, c in rows)
+        return cls(items, Progress())
+
+
+def _target(step: Advance, now_s: float) -> Target:
+    height = Target(
+        now_s,
+        speed_mps=step.progress.speed_mps,
+        down_m=step.down_m,
+        lifts=step.lifts,
+        lands=step.lands,
+    )
+    if step.goal_m is None:
+        return replace(height, velocity_mps=(0.0, 0.0))
+    return replace(height, position_m=step.goal_m)
+
+
 class Navigator:
     """Mission, fence and rally points of one vehicle."""
 
-    def __init__(self, origin: Origin) -> None:
-        self._origin = origin
+    def __init__(self, origin: Origin, flies: bool = False) -> None:
+        self._origin, self.flies = origin, flies
         self._zones: tuple[Zone, ...] = ()
         self._running = False
+        self._return: Return | None = None
         self.progress = Progress()
         self.lists: dict[MissionType, Items] = dict.fromkeys(
             (MissionType.MISSION, MissionType.FENCE, MissionType.RALLY), ()
@@ -74,13 +116,26 @@ class Navigator:
         """Where AUTO or RTL wants to go now, and what to tell; other modes pause the mission."""
         resumed = mode is RoverMode.AUTO and not self._running
         self._running = mode is RoverMode.AUTO
-        if mode is RoverMode.RTL:
+        if mode is not RoverMode.RTL:
+            self._return = None
+        elif around.air is not None:
+            return self._fly_home(around, around.air), []
+        else:
             return Target(around.now_s, position_m=self._way_home(around)), []
         if mode is not RoverMode.AUTO:
             return None, []
         if resumed and self.progress.complete:
             self.progress = Progress()
         return self._run(around)
+
+    def _fly_home(self, around: Surroundings, air: Air) -> Target:
+        """Rise to RTL_ALT, go home, land: a mission of its own."""
+        around = replace(around, home_m=self._way_home(around))
+        if self._return is None:
+            self._return = Return.begun(around.return_height_m, air)
+        step = advance(self._return.items, self._return.progress, around)
+        self._return = replace(self._return, progress=step.progress)
+        return _target(step, around.now_s)
 
     def _run(self, around: Surroundings) -> tuple[Target, list[Message]]:
         before = self.progress
@@ -96,10 +151,7 @@ class Navigator:
             told.append(self.current())
         if self.progress.complete and not before.complete:
             told.append(StatusText(Severity.NOTICE, "Mission Complete"))
-        target = Target(around.now_s, speed_mps=self.progress.speed_mps)
-        if step.goal_m is None:
-            return replace(target, velocity_mps=(0.0, 0.0)), told
-        return replace(target, position_m=step.goal_m), told
+        return _target(step, around.now_s), told
 
     def _way_home(self, around: Surroundings) -> Point:
         """The nearest of home and the rally points."""

@@ -97,6 +97,7 @@ def rover_parameters(sysid: int, station_sysid: int, airframe: Airframe) -> Para
             *(_fixed(f"SERVO{i}_MIN", 1100) for i in range(1, len(airframe.motors) + 1)),
             *(_fixed(f"SERVO{i}_MAX", 1900) for i in range(1, len(airframe.motors) + 1)),
             *(_fixed(f"SERVO{i}_TRIM", 1500) for i in range(1, len(airframe.motors) + 1)),
+            *((Parameter("RTL_ALT", 500, 30, 300_000),) if airframe.flight else ()),  # cm
             Parameter("SYSID_MYGCS", station_sysid, 1, 255, int16),
             _fixed("SYSID_THISMAV", sysid),
             Parameter("WP_RADIUS", 0.2, 0.05, 100),

@@ -108,7 +108,8 @@ def heartbeat(s: Snapshot) -> Heartbeat:
     base_mode = MODE_FLAG_CUSTOM | _MODE_FLAGS.get(s.autopilot.mode, 0)
     mode = int(s.autopilot.mode)
     if s.flies:
-        mode = copter_number(s.autopilot.mode, s.landed is LandedState.LANDING)
+        told_to_land = s.autopilot.mode is RoverMode.HOLD and s.landed is LandedState.LANDING
+        mode = copter_number(s.autopilot.mode, told_to_land)
     kind = TYPE_QUADROTOR if s.flies else TYPE_ROVER
     return Heartbeat(kind, AUTOPILOT_ARDUPILOT, s.autopilot.armed, mode, int(status), base_mode)
 

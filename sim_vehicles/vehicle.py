@@ -30,7 +30,6 @@ from hil.scenario import Scenario
 from sim_vehicles import telemetry
 from sim_vehicles.autopilot import (
     Autopilot,
-    Failsafe,
     Readiness,
     Target,
     Transition,
@@ -47,10 +46,10 @@ from sim_vehicles.copter_modes import mode_of
 from sim_vehicles.damage import MotorOutputs
 from sim_vehicles.escs import esc_telemetry
 from sim_vehicles.estimator import Estimate, Estimator
-from sim_vehicles.failsafes import Breaches, Sagging, Signs, complaints, trips
+from sim_vehicles.failsafes import Breaches, Sagging, Signs, Trip, complaints, trips
 from sim_vehicles.flying import climb_to, has_landed, land, landing_speed, settle, take_off
 from sim_vehicles.innovation import Innovation, innovation
-from sim_vehicles.mission import Surroundings
+from sim_vehicles.mission import Air, Surroundings
 from sim_vehicles.navigator import Navigator
 from sim_vehicles.parameters import Parameters, rover_parameters
 from sim_vehicles.port import Port
@@ -134,7 +133,7 @@ class Vehicle:
         self._estimator = Estimator(scenario.sensors)
         self._parameters = rover_parameters(sysid, scenario.links.station_sysid, member.frame)
         self._autopilot = Autopilot()
-        self._navigator = Navigator(self._origin)
+        self._navigator = Navigator(self._origin, member.frame.flight is not None)
         self._breaches, self._sagging = Breaches(), Sagging()
         self._battery = BatteryState.full(member.frame.battery)
         self._memory = Memory()
@@ -152,8 +151,10 @@ class Vehicle:
 
     def _connect(self) -> None:
         """The services of all stations, and the injector's, which alone can break the vehicle."""
-        modes = ModeService(self._apply, self._fly_in if self._drive.airframe.flight else None)
-        setpoints = SetpointService(self._origin, self._estimator.estimate, self._apply)
+        flies = self._drive.airframe.flight is not None
+        home_down = (lambda: (self._home_m or (0.0, 0.0, 0.0))[2]) if flies else None
+        setpoints = SetpointService(self._origin, self._estimator.estimate, self._apply, home_down)
+        modes = ModeService(self._apply, self._fly_in if flies else None)
         fence = FenceService(self._parameters, self._navigator)
         self._missions = MissionService(self._navigator, self._origin, self._home, self._apply)
         self._piloting = PilotingService()
@@ -264,10 +265,18 @@ class Vehicle:
         self._sagging = self._sagging.at(now_s, self._battery.voltage_v, self._parameters)
         signs = self._signs()
         for trip in trips(signs, self._parameters):
-            self._apply(partial(_checked, trip.which, trip.tripped, trip.action))
+            self._check(trip)
         released = self._piloting.sticks.are_released(now_s)
         self._apply(lambda state, _ready: check_sticks(state, released))
         self._apply(lambda state, _ready: check_target(state, now_s))
+
+    def _check(self, trip: Trip) -> None:
+        known, flies = self._autopilot.tripped, self._navigator.flies
+        self._apply(
+            lambda state, _ready: check(state, trip.which, trip.tripped, trip.action, flies)
+        )
+        if self._autopilot.tripped - known and trip.action is RoverMode.HOLD and self._hovers:
+            self._memory = land(self._memory)
 
     def _signs(self) -> Signs:
         now_s, heard_s = self._now_s or 0.0, self._gcs_heard_s
@@ -296,12 +305,25 @@ class Vehicle:
             (self._home_m or (0.0, 0.0, 0.0))[:2],
             self._origin,
             self._parameters["WP_RADIUS"],
+            self._air(),
+            self._parameters["RTL_ALT"] / 100.0 if self._navigator.flies else 0.0,
         )
         mode = self._autopilot.mode if self._autopilot.armed else RoverMode.HOLD
         target, told = self._navigator.steer(mode, around)
         if target is not None:
             self._autopilot = replace(self._autopilot, target=target)
+            if target.lifts and not self._memory.airborne:
+                self._memory = take_off(self._memory)
         self._tell(told)
+        done = mode is RoverMode.AUTO and self._navigator.progress.complete
+        if done and self._navigator.flies and not self._memory.airborne:
+            self._apply(lambda state, _ready: disarm(state))
+
+    def _air(self) -> Air | None:
+        if not self._navigator.flies:
+            return None
+        down_m, home_m = self._estimator.estimate().position_m[2], self._home_m
+        return Air(down_m, home_m[2] if home_m else 0.0, not self._memory.airborne)
 
     def _control(self, dt_s: float) -> tuple[int, ...]:
         """PWM as commanded, 16 channels."""
@@ -317,9 +339,10 @@ class Vehicle:
         else:
             velocity = self._aim(estimate, dt_s)
             outputs, self._memory = steer(self._drive, self._memory, estimate, velocity, dt_s)
-            if self._memory.landing and has_landed(self._memory):
+            if self._lands and has_landed(self._memory):
                 self._memory = settle(self._memory)
-                self._apply(lambda state, _ready: disarm(state))
+                if self._autopilot.mode is not RoverMode.AUTO:  # a mission may go on
+                    self._apply(lambda state, _ready: disarm(state))
         self._battery = drain(self._battery, loads(self._drive.airframe, outputs), dt_s)
         return pad_channels([output_to_pwm(output) for output in outputs])
 
@@ -327,6 +350,12 @@ class Vehicle:
     def _hovers(self) -> bool:
         """In the air no mode cuts the rotors."""
         return self._autopilot.armed and self._memory.airborne
+
+    @property
+    def _lands(self) -> bool:
+        """Coming down: told to, or by AUTO or RTL."""
+        target = self._autopilot.target
+        return self._memory.landing or (target is not None and target.lands)
 
     def _take_off(self, height_m: float) -> Result:
         """In GUIDED, armed: rise to a height above home, here."""
@@ -352,6 +381,7 @@ class Vehicle:
             return self._land()
         mode = mode_of(number)
         if mode is None:
+            self._tell((StatusText(Severity.WARNING, f"Mode {number} is not implemented"),))
             return Result.UNSUPPORTED
         result = self._apply(lambda state, ready: set_mode(state, mode, ready))
         if result is Result.ACCEPTED:
@@ -361,17 +391,18 @@ class Vehicle:
     def _aim(self, estimate: Estimate, dt_s: float) -> Vector:
         """The velocity that the target asks for now; turns the heading to hold towards it."""
         target = self._autopilot.target
-        if self._memory.landing:
+        sinking_mps = 0.0
+        if self._lands:
             height_m = (self._home_m or (0.0, 0.0, 0.0))[2] - estimate.position_m[2]
-            return 0.0, 0.0, landing_speed(self._drive.airframe, height_m)
-        if target is None:
-            return 0.0, 0.0, 0.0
+            sinking_mps = landing_speed(self._drive.airframe, height_m)
+        if target is None or self._memory.landing:
+            return 0.0, 0.0, sinking_mps
         if target.yaw_rad is not None:
             self._memory = replace(self._memory, yaw_rad=target.yaw_rad)
         elif target.yaw_rate_radps is not None:
             yaw_rad = wrap_pi(self._memory.yaw_rad + target.yaw_rate_radps * dt_s)
             self._memory = replace(self._memory, yaw_rad=yaw_rad)
-        down_mps = target.down_mps
+        down_mps = sinking_mps if target.lands else target.down_mps
         if target.down_m is not None:
             down_mps = climb_to(self._drive.airframe, estimate, target.down_m)
         if target.position_m is not None:
@@ -417,7 +448,7 @@ class Vehicle:
     def _landed_state(self) -> LandedState:
         if not self._memory.airborne:
             return LandedState.ON_GROUND
-        return LandedState.LANDING if self._memory.landing else LandedState.IN_AIR
+        return LandedState.LANDING if self._lands else LandedState.IN_AIR
 
     def _build(self, build: Callable[[Snapshot], Message | None]) -> Message | None:
         return build(self._snapshot())
@@ -451,9 +482,3 @@ class Vehicle:
 
     def _fence(self) -> FenceStatus | None:
         return self._breaches.status() if self._parameters["FENCE_ENABLE"] else None
-
-
-def _checked(
-    which: Failsafe, tripped: bool, action: RoverMode | None, state: Autopilot, _ready: Readiness
-) -> Transition:
-    return check(state, which, tripped, action)

@@ -159,7 +159,7 @@ class MissionService:
         if item.seq != len(upload.items):
             return []  # a repeat, or one that came too early; the one asked for is still due
         item = tidied(item)
-        result = refusal(item, self._origin)
+        result = refusal(item, self._origin, self._navigator.flies)
         if result is not None:
             self._upload = None
             return [upload.ack(result)]

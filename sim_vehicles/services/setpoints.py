@@ -16,6 +16,7 @@ from hil.mavlink import (
     LocalSetpoint,
     Result,
     RoverMode,
+    TypeMask,
     Vector,
 )
 from sim_vehicles.autopilot import Autopilot, Readiness, Target, Transition, accept_target, set_mode
@@ -39,8 +40,11 @@ class SetpointService:
         origin: Origin,
         estimate: Callable[[], Estimate],
         apply: Callable[[Change], Result],
+        home_down: Callable[[], float] | None = None,
     ) -> None:
+        """`home_down` is where heights count from (NED down, m), for what flies."""
         self._origin, self._estimate, self._apply = origin, estimate, apply
+        self._home_down = home_down
 
     def handlers(self) -> Handlers:
         return {LocalSetpoint: self._local, GlobalSetpoint: self._global}
@@ -52,7 +56,9 @@ class SetpointService:
         return self._accept(to_target(request.value, self._estimate(), request.now_s))
 
     def _global(self, request: Request) -> Replies:
-        local = to_local(request.value, self._origin)
+        value: GlobalSetpoint = request.value
+        down_m = self._down(value.frame, value.position[2]) if value.position else None
+        local = to_local(value, self._origin, down_m)
         if local is not None:
             self._accept(to_target(local, self._estimate(), request.now_s))
         return []
@@ -70,11 +76,21 @@ class SetpointService:
         point = _ned(lat, lon, self._origin)
         if order.frame not in tuple(GlobalFrame) or flags is None or point is None:
             return DENIED
-        speed = order.params[0]
-        target = Target(order.now_s, position_m=point, speed_mps=speed if speed > 0.0 else None)
+        down_m = self._down(order.frame, order.params[6])
+        if down_m is not None and abs(down_m) > ABSURD_M:
+            return DENIED
+        speed = order.params[0] if order.params[0] > 0.0 else None
+        target = Target(order.now_s, position_m=point, speed_mps=speed, down_m=down_m)
         return Outcome(
             self._apply(lambda state, ready: reposition(state, ready, target, flags & CHANGE_MODE))
         )
+
+    def _down(self, frame: int, alt_m: float) -> float | None:
+        """NED down (m) of an altitude; None for what drives, and to keep the height."""
+        if self._home_down is None or math.isnan(alt_m):
+            return None
+        above_sea = frame in (GlobalFrame.GLOBAL, GlobalFrame.GLOBAL_INT)
+        return (self._origin.alt_m if above_sea else self._home_down()) - alt_m
 
 
 def reposition(state: Autopilot, ready: Readiness, target: Target, change_mode: int) -> Transition:
@@ -85,8 +101,10 @@ def reposition(state: Autopilot, ready: Readiness, target: Target, change_mode: 
     return replace(guided, state=accept_target(guided.state, target))
 
 
-def to_local(setpoint: GlobalSetpoint, origin: Origin) -> LocalSetpoint | None:
-    """The same in local NED; None for what can't be meant. Altitudes stay on the ground."""
+def to_local(
+    setpoint: GlobalSetpoint, origin: Origin, down_m: float | None = None
+) -> LocalSetpoint | None:
+    """The same in local NED, at a height; None for what can't be meant."""
     if setpoint.frame not in tuple(GlobalFrame):
         return None
     place: Vector | None = None
@@ -94,7 +112,7 @@ def to_local(setpoint: GlobalSetpoint, origin: Origin) -> LocalSetpoint | None:
         point = _ned(setpoint.position[0], setpoint.position[1], origin)
         if point is None:
             return None
-        place = (*point, 0.0)
+        place = (*point, down_m or 0.0)
     s = setpoint
     head = (s.target_sysid, s.target_compid, s.time_s, Frame.LOCAL_NED, s.type_mask)
     return LocalSetpoint(*head, place, s.velocity_mps, s.yaw_rad, s.yaw_rate_radps)
@@ -115,9 +133,11 @@ def to_target(setpoint: LocalSetpoint, estimate: Estimate, now_s: float) -> Targ
         north, east = _turned(setpoint.position_m, estimate, in_body)
         if setpoint.frame != Frame.LOCAL_NED:
             north, east = north + estimate.position_m[0], east + estimate.position_m[1]
-        down = setpoint.position_m[2]
+        down: float | None = setpoint.position_m[2]
         if setpoint.frame not in (Frame.LOCAL_NED, Frame.BODY_NED):
-            down += estimate.position_m[2]
+            down = setpoint.position_m[2] + estimate.position_m[2]
+        if setpoint.type_mask & TypeMask.Z:
+            down = None
         point = (north, east)
         return Target(now_s, None, point, yaw_rad, setpoint.yaw_rate_radps, down_m=down)
     if setpoint.velocity_mps is not None:
