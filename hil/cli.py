@@ -12,6 +12,7 @@ from hil.options import Parser, port, speed
 from hil.scenario import Scenario, load_scenario
 
 EXIT_BROKEN_PIPE = 128 + 13  # as a process that SIGPIPE ended
+EXIT_INTERRUPTED = 128 + 2  # as one that SIGINT ended
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -22,6 +23,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except HilError as error:
         print(f"hil: {error}", file=sys.stderr)
         code = error.exit_code
+    except KeyboardInterrupt:
+        print("hil: interrupted", file=sys.stderr)
+        code = EXIT_INTERRUPTED
     except BrokenPipeError:  # as in `hil schema | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = EXIT_BROKEN_PIPE

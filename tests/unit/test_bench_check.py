@@ -80,6 +80,17 @@ def test_an_unreadable_onset_is_refused() -> None:
         describe(Scenario.model_validate(tree))
 
 
+def test_an_early_interrupt_is_no_traceback(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("hil.cli.load_scenario", interrupted)
+    assert main(["run", str(RESCUE)]) == 128 + 2
+    assert capsys.readouterr().err == "hil: interrupted\n"
+
+
 def test_the_command_line_imports_nothing_heavy() -> None:
     code = (
         "import sys; from hil.cli import main; code = main(['check', sys.argv[1]]); "
