@@ -148,6 +148,7 @@ def _hypothesis(tree: dict[str, Any]) -> Hypothesis:
             Type(fault["type"]),
             tuple(fault["instances"]),
             tuple(fault["axes"]),
+            tuple(fault["size"]),
         ),
     )
 

@@ -7,7 +7,7 @@ from hil.airframe import push_margin
 from hil.bench.onsets import Onsets
 from hil.bench.record import describe_fault
 from hil.errors import InputError
-from hil.faults import Unit
+from hil.faults import Type, Unit
 from hil.link import MAVLINK_PORT_BASE
 from hil.scenario import MIN_PUSH_MARGIN, FaultModel, Scenario, Vehicle, station_view
 
@@ -82,7 +82,7 @@ def _refuse_weak_rescue(path: Path, scenario: Scenario) -> None:
 
 def _dead_axes(fault: FaultModel, vehicle: Vehicle) -> list[str]:
     what = fault.fault()
-    if what.unit is not Unit.MOTOR:
+    if (what.unit, what.type) != (Unit.MOTOR, Type.OFF):
         return []
     off = what.instances or range(1, len(vehicle.frame.motors) + 1)
     return [a for a in AXES if set(vehicle.frame.axis_motors(a)) <= set(off)]

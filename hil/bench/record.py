@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 from hil.bench.lines import Outcome
-from hil.faults import Unit
 from hil.scenario import FaultModel, Scenario
 from hil.world.truth import ContactEpisode, TruthRecord
 
@@ -27,8 +26,9 @@ class RunRecord:
 
 
 def describe_fault(scenario: Scenario, fault: FaultModel) -> str:
-    """As in 'rover_2: motor 3, 4 off'."""
+    """As in 'rover_2: motor 3, 4 off', 'rover_1: gps all offset 3, -2, 0'."""
     what = fault.fault()
     parts = (", ".join(map(str, what.instances)), ", ".join(what.axes))
-    part = parts[0] if what.unit is Unit.MOTOR else parts[1]
-    return f"{scenario.vehicle(fault.vehicle).name}: {fault.unit} {part or 'all'} {fault.type}"
+    part = parts[0] or parts[1] or "all"
+    size = "".join((" ", ", ".join(f"{s:g}" for s in what.size)) if what.size else ())
+    return f"{scenario.vehicle(fault.vehicle).name}: {fault.unit} {part} {fault.type}{size}"

@@ -81,16 +81,21 @@ def is_correct(verdict: Verdict | None, truth: dict[int, str]) -> bool:
     return truth.get(verdict.sysid, NONE) == verdict.hypothesis
 
 
-def _effect(faults: list[Fault], motors: int) -> tuple[frozenset[int], frozenset[str]]:
-    """Motors that are off and GPS axes that are stuck: equal effects are equal faults."""
+def _effect(
+    faults: list[Fault], motors: int
+) -> tuple[frozenset[int], frozenset[str], frozenset[Fault]]:
+    """Motors that are off, GPS axes that are stuck, all else: equal effects are equal faults."""
     off: set[int] = set()
     stuck: set[str] = set()
+    others: set[Fault] = set()
     for f in faults:
         if (f.unit, f.type) == (Unit.MOTOR, Type.OFF):
             off |= set(f.instances or range(1, motors + 1))
-        if (f.unit, f.type) == (Unit.GPS, Type.STUCK):
+        elif (f.unit, f.type) == (Unit.GPS, Type.STUCK):
             stuck |= set(f.axes or ("north", "east", "down"))
-    return frozenset(off), frozenset(stuck)
+        else:
+            others.add(f)
+    return frozenset(off), frozenset(stuck), frozenset(others)
 
 
 def _goals(scenario: Scenario, outcome: Outcome, truth: TruthRecord) -> dict[int, GoalScore]:

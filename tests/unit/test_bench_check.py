@@ -36,6 +36,14 @@ def test_fleet_faults_and_margins_are_shown() -> None:
         assert words in text
 
 
+def test_faults_are_told_with_their_sizes() -> None:
+    weak = {"vehicle": 2, "unit": "motor", "type": "partial", "instances": [1], "size": 0.5}
+    jump = {"vehicle": 1, "unit": "gps", "type": "offset", "size": [3.0, -2.0, 0.0]}
+    text = describe(Scenario.model_validate(rescue().model_dump() | {"faults": [weak, jump]}))
+    assert "rover_2: motor 1 partial 0.5," in text
+    assert "rover_1: gps all offset 3, -2, 0," in text
+
+
 @pytest.mark.parametrize("command", ["check", "run"])
 def test_a_rescue_nobody_can_give_is_refused(
     command: str,
@@ -60,9 +68,10 @@ def test_a_rescue_nobody_can_give_is_refused(
         alone(expect={}),
         alone(expect={"goals": {2: ["uncertain", "unreached"]}}),
         alone(faults=[{"vehicle": 2, "unit": "motor", "type": "off", "instances": [3]}]),
+        alone(faults=[{"vehicle": 2, "unit": "motor", "type": "partial", "size": 0.9}]),
         alone(faults=[{"vehicle": 2, "unit": "gps", "type": "stuck"}]),
     ],
-    ids=["can turn", "no expectation", "not expected", "half a pair", "gps"],
+    ids=["can turn", "no expectation", "not expected", "half a pair", "weak", "gps"],
 )
 def test_what_is_no_rescue_passes(scenario: Scenario) -> None:
     refuse_hopeless(Path("x.yaml"), scenario)

@@ -82,6 +82,21 @@ def test_the_truth_has_the_name_the_station_would_give_it(fault: dict[str, Any],
     assert score(scenario, record(scenario)).true_hypotheses == {2: name}
 
 
+@pytest.mark.parametrize(
+    "also",
+    [
+        {"unit": "gps", "type": "offset", "size": [1.0, 0.0, 0.0]},
+        {"unit": "motor", "type": "partial", "instances": [1], "size": 0.5},
+        {"unit": "esc", "type": "off"},
+    ],
+)
+def test_one_fault_more_is_another_truth(also: dict[str, Any]) -> None:
+    off = {"vehicle": 2, "unit": "motor", "type": "off", "instances": [3, 4]}
+    for faults in ([off, {"vehicle": 2, **also}], [{"vehicle": 2, **also}]):
+        scenario = with_faults(*faults)
+        assert score(scenario, record(scenario)).true_hypotheses == {2: "unknown"}
+
+
 def test_two_faults_of_a_pair_are_one_hypothesis() -> None:
     off = {"vehicle": 2, "unit": "motor", "type": "off"}
     scenario = with_faults({**off, "instances": [3]}, {**off, "instances": [4]})

@@ -30,6 +30,7 @@ FAULTS = st.one_of(
         st.sampled_from([Type.OFF, Type.STUCK]),
         st.lists(st.integers(1, 8), max_size=3).map(tuple),
         st.lists(st.sampled_from(["north", "east"]), max_size=2).map(tuple),
+        st.lists(NUMBERS, max_size=3).map(tuple),
     ),
 )
 HYPOTHESES = st.builds(Hypothesis, st.text(max_size=8), st.integers(1, 249), NUMBERS, FAULTS)
