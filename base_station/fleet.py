@@ -1,6 +1,5 @@
 """The receiving side: messages of all vehicles to tracks, on one clock, cut into ticks."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from base_station.fleet_clock import FleetClock
@@ -71,8 +70,8 @@ class Fleet:
         times = [t.newest_s() for t in self.tracks]
         return min(times) >= time_s - 1e-3 or max(times) >= time_s + WAIT_FOR_LATE_S
 
-    def silent(self, wall_s: float) -> Sequence[int]:
-        """Vehicles not heard of for LINK_LOST_WALL_S."""
+    def silent(self, wall_s: float) -> list[int]:
+        """Vehicles not heard of for LINK_LOST_WALL_S, once they had been."""
         return [
             i
             for i, t in enumerate(self.tracks)

@@ -13,6 +13,7 @@ from base_station.commander import Commander
 from base_station.commands import AskTime, Command, Heartbeat
 from base_station.desk import Desk
 from base_station.execution import Orders
+from base_station.fleet import LINK_LOST_WALL_S
 from base_station.phases import (
     Arming,
     Concluding,
@@ -85,6 +86,7 @@ class Station:
             desk.fleet.receive(index, message, wall_s)
             self._note(index, message)
         desk.time_s = max(desk.time_s, desk.fleet.newest_s)
+        self._mind_the_links(wall_s)
         commands += self._keep_alive(wall_s)
         if isinstance(desk.phase, Connecting | Arming):
             commands += get_ready(desk, self._commander)
@@ -164,6 +166,13 @@ class Station:
             name = self.desk.view.fleet[i].name
             self.desk.say("takeover", f"{name} was taken over: not commanded any more")
             self.desk.stop("takeover")
+
+    def _mind_the_links(self, wall_s: float) -> None:
+        silent = () if self.desk.ended else self.desk.fleet.silent(wall_s)
+        if silent:
+            names = ", ".join(self.desk.view.fleet[i].name for i in silent)
+            self.desk.say("link", f"no word from {names} for {LINK_LOST_WALL_S:.0f} s")
+            self.desk.stop("a link is lost")
 
     def _mind_the_time(self) -> None:
         desk = self.desk

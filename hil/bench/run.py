@@ -29,9 +29,11 @@ from hil.bench.viewers import Viewer, live_viewer, until_interrupted
 from hil.errors import EXIT_AS_EXPECTED, EXIT_NOT_AS_EXPECTED, HilError
 from hil.scenario import Scenario
 
+STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # SIGHUP: the terminal is gone
+
 
 class Interrupted(HilError):  # noqa: N818 - said by a person, not an error
-    """SIGINT or SIGTERM: everything is stopped, files are kept. Exit code 128 + signal."""
+    """SIGINT, SIGTERM or SIGHUP: everything is stopped, files are kept. Exit code 128 + signal."""
 
     def __init__(self, number: int) -> None:
         super().__init__(f"interrupted by {signal.Signals(number).name}; files are kept")
@@ -150,14 +152,14 @@ def _how(options: RunOptions) -> str:
 
 @contextmanager
 def _interruptible() -> Iterator[None]:
-    """The first SIGINT or SIGTERM raises Interrupted; later ones do not disturb the stopping."""
+    """The first of STOPPING raises Interrupted; later ones do not disturb the stopping."""
 
     def raise_once(number: int, _frame: FrameType | None) -> None:
-        for n in (signal.SIGINT, signal.SIGTERM):
+        for n in STOPPING:
             signal.signal(n, signal.SIG_IGN)
         raise Interrupted(number)
 
-    before = {n: signal.signal(n, raise_once) for n in (signal.SIGINT, signal.SIGTERM)}
+    before = {n: signal.signal(n, raise_once) for n in STOPPING}
     try:
         yield
     finally:

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from base_station.fleet import Fleet
+from base_station.fleet import LINK_LOST_WALL_S, Fleet
 from base_station.fleet_clock import FleetClock
+from base_station.station import Station
 from base_station.telemetry import Sample, Track
-from hil.mavlink import COMPONENT_AUTOPILOT, LocalPosition, Received
+from hil.mavlink import COMPONENT_AUTOPILOT, Heartbeat, LocalPosition, Received
 from hil.scenario import StationView
 
 
@@ -75,3 +76,23 @@ def test_boot_clocks_that_differ_are_brought_together() -> None:
         clock.reply(2, 9_000_000_000 + delayed_ns, asked_ns, delayed_ns + 1_000_000)
     assert clock.fleet_time_s(1, 5.0) == pytest.approx(5.0)
     assert clock.fleet_time_s(2, 9.0) == pytest.approx(5.0, abs=1e-3)
+
+
+def test_a_vehicle_that_falls_silent_is_named_and_the_fleet_holds(rescue_view: StationView) -> None:
+    station = Station(rescue_view)
+
+    def hear(indices: tuple[int, ...], wall_s: float) -> list[str]:
+        beat = Heartbeat(10, 3, False, 4, 3)
+        sysids = [rescue_view.fleet[i].sysid for i in indices]
+        received = [
+            (i, Received(s, COMPONENT_AUTOPILOT, beat))
+            for i, s in zip(indices, sysids, strict=True)
+        ]
+        return [e.text for e in station.step(wall_s, received).events]
+
+    assert hear((0, 1, 2), 0.0) == []
+    assert hear((0, 2), LINK_LOST_WALL_S) == []
+    texts = hear((0, 2), LINK_LOST_WALL_S + 0.1)
+    assert texts[0] == "no word from rover_2 for 5 s"
+    assert station.desk.ended
+    assert hear((0, 2), LINK_LOST_WALL_S + 1.0) == []
