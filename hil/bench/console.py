@@ -1,5 +1,8 @@
 """What a person sees of a run: phases, learning, events; in a terminal live, elsewhere as lines."""
 
+import os
+import shutil
+import sys
 import time
 from collections import deque
 from collections.abc import Callable
@@ -123,7 +126,7 @@ class Console:
         self._out.print(summary(tree, scenario))
         if recording is not None:
             line = Text("  look at it  ", style="dim").append(
-                f"hil view {recording.parent}", style="bold cyan"
+                f"{called_as()} view {recording.parent}", style="bold cyan"
             )
             self._out.print(line, soft_wrap=True)
 
@@ -204,3 +207,11 @@ def sparkline(values: list[float]) -> str:
     low, span = min(finite), max(finite) - min(finite)
     steps = [(v - low) / span if span > 0 else 0.0 for v in finite]
     return "".join(_SPARKS[min(len(_SPARKS) - 1, int(s * len(_SPARKS)))] for s in steps)
+
+
+def called_as() -> str:
+    """How to type `hil` here: its name where PATH finds it, else the way to it from this folder."""
+    program = Path(sys.argv[0])
+    if program.name != "hil" or shutil.which("hil"):
+        return "hil"
+    return os.path.relpath(program)
