@@ -15,6 +15,7 @@ OPTIONS = (
     *("--headless", "--no-sandbox", "--remote-debugging-pipe", "--hide-scrollbars"),
     *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"),
     *("--window-size=1280,800", "--disable-background-networking"),
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",  # there is no Internet
 )
 # becomes the program whose descriptors 3 and 4 are the pipes
 _WITH_PIPES = """
