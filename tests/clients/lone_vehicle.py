@@ -16,6 +16,7 @@ PATIENCE_S = 30.0
 SYSID = 2
 LONE = """
 name: lone
+yaw: {yaw}
 arena: {{north_min_m: -30.0, north_max_m: 30.0, east_min_m: -30.0, east_max_m: 30.0}}
 fleet:
   - name: vehicle
@@ -40,8 +41,9 @@ def lone_vehicle(
     folder: Path, airframe: str = "omni_plus", speed: float = 1.0, options: tuple[str, ...] = ()
 ) -> Iterator[Ports]:
     """`options` are for the vehicle's command line."""
+    yaw = "free" if airframe == "skid_steer" else "locked"  # it has to turn
     scenario = folder / "lone.yaml"
-    scenario.write_text(LONE.format(sysid=SYSID, airframe=airframe))
+    scenario.write_text(LONE.format(sysid=SYSID, airframe=airframe, yaw=yaw))
     physics, ports = free_port(), Ports(free_port(), free_port(), free_port())
     world = ["hil.cli", "world", str(scenario), "--physics-port", str(physics)]
     vehicle = ["sim_vehicles.process", str(scenario), "--sysid", str(SYSID)]

@@ -25,24 +25,14 @@ TROUBLE = (
 )
 WAY = """QGC WPL 110
 0 1 0 16 0 0 0 0 47.397742 8.545594 488 1
-1 0 3 16 0 0 0 0 47.397751 8.545594 0 1
-2 0 3 16 0 0 0 0 47.397742 8.545594 0 1
+1 0 3 16 0 0 0 0 47.397751 8.545594 3 1
+2 0 3 16 0 0 0 0 47.397742 8.545594 3 1
 """
+Script = tuple[tuple[str | None, str | None], ...]
 
 
-def console(ports: Ports, folder: Path) -> Console:
-    """On the station's port, with its state in a folder of its own."""
-    assert MAVPROXY is not None
-    (folder / "way.txt").write_text(WAY.replace(" ", "\t").replace("QGC\tWPL\t", "QGC WPL "))
-    options = [f"--master=udpin:127.0.0.1:{ports.mavlink}", f"--default-modules={MODULES}"]
-    options += ["--source-system=245", f"--state-basedir={folder}"]
-    return Console([sys.executable, MAVPROXY, *options], folder)
-
-
-def drive(prompt: Console) -> None:
-    prompt.expect("Detected vehicle 2:1")
-    prompt.expect("parameters to ")
-    for said, heard in (
+def drive(throttle_percent: int) -> Script:
+    return (
         ("param set FS_TIMEOUT 7", None),
         ("mode GUIDED", "Mode GUIDED"),
         ("arm throttle", "AP: Throttle armed"),
@@ -60,14 +50,48 @@ def drive(prompt: Console) -> None:
         ("mode MANUAL", "Mode MANUAL"),
         ("rc 3 1700", None),
         ("watch RC_CHANNELS", "chan3_raw : 1700"),
-        ("watch VFR_HUD", "throttle : 20"),
+        ("watch VFR_HUD", f"throttle : {throttle_percent}"),
         ("watch", None),
         ("mode HOLD", "Mode HOLD"),
         ("disarm", "DISARMED"),
         ("param fetch FS_TIMEOUT", "FS_TIMEOUT = 7.0"),
         ("fence list", "Requesting 0 fence items"),
         ("rally list", "Requesting 0 rally items"),
-    ):
+    )
+
+
+FLY = (
+    ("mode GUIDED", "Mode GUIDED"),
+    ("arm throttle", "AP: Throttle armed"),
+    (None, "ARMED"),
+    ("takeoff 3", "TAKEOFF: ACCEPTED"),
+    ("watch VFR_HUD", None),
+    (AGAIN + "velocity 1 0 0", "groundspeed : 0.9"),
+    ("watch", None),
+    ("wp load way.txt", "Got MISSION_ACK: TYPE_MISSION: ACCEPTED"),
+    ("wp list", "Saved waypoints to"),
+    ("mode AUTO", "AP: Reached waypoint #1"),
+    (None, "AP: Mission Complete"),
+    ("wp clear", "Got MISSION_ACK: TYPE_MISSION: ACCEPTED"),
+    ("mode RTL", "Mode RTL"),
+    (None, "AP: Throttle disarmed"),
+    (None, "DISARMED"),
+)
+
+
+def console(ports: Ports, folder: Path) -> Console:
+    """On the station's port, with its state in a folder of its own."""
+    assert MAVPROXY is not None
+    (folder / "way.txt").write_text(WAY.replace(" ", "\t").replace("QGC\tWPL\t", "QGC WPL "))
+    options = [f"--master=udpin:127.0.0.1:{ports.mavlink}", f"--default-modules={MODULES}"]
+    options += ["--source-system=245", f"--state-basedir={folder}"]
+    return Console([sys.executable, MAVPROXY, *options], folder)
+
+
+def follow(prompt: Console, script: Script) -> None:
+    prompt.expect("Detected vehicle 2:1")
+    prompt.expect("parameters to ")
+    for said, heard in script:
         if said is not None and said.startswith(AGAIN):
             prompt.expect(str(heard), again=said.removeprefix(AGAIN))
             continue
@@ -77,11 +101,16 @@ def drive(prompt: Console) -> None:
             prompt.expect(heard)
 
 
-def test_mavproxy_and_a_rover(tmp_path: Path) -> None:
-    with lone_vehicle(tmp_path, speed=SPEED) as ports:
+@pytest.mark.parametrize(
+    ("airframe", "throttle_percent"),  # mean of all motors with the stick at 40 %
+    [("omni_plus", 20), ("omni_x", 28), ("skid_steer", 40), ("quad_x", None)],
+)
+def test_mavproxy_and(airframe: str, throttle_percent: int | None, tmp_path: Path) -> None:
+    script = FLY if throttle_percent is None else drive(throttle_percent)
+    with lone_vehicle(tmp_path, airframe, SPEED) as ports:
         prompt = console(ports, tmp_path)
         try:
-            drive(prompt)
+            follow(prompt, script)
         finally:
             prompt.stop()
     assert [line for line in prompt.said if any(word in line for word in TROUBLE)] == []
