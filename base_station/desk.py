@@ -8,7 +8,8 @@ from base_station.diagnosis import Verdict
 from base_station.doubt import Doubt
 from base_station.execution import Orders
 from base_station.fleet import Fleet
-from base_station.hypotheses import Hypothesis
+from base_station.hindsight import Hindsight
+from base_station.hypotheses import Hypothesis, candidates
 from base_station.phases import AnyPhase, Connecting, Finished, Holding, Settling
 from base_station.planning.requests import Kind, PlanReady, PlanRequest
 from base_station.records import Event, EventKind
@@ -99,7 +100,15 @@ class Desk:
         """Stop everybody, then doubt the vehicle whose alarm stands out most."""
         level = self.watch.cusum.level.max(axis=1)
         suspect = max(self.alarmed, key=lambda i: float(level[i]))
-        self.enter(Settling(self.time_s, suspect, self.alarmed[suspect]))
+        hindsight = Hindsight(
+            self.watch.baseline,
+            tuple(self.watch.memory),
+            suspect,
+            candidates(self.view.fleet[suspect], self.view.diagnosis.priors),
+            self.alarmed[suspect],
+            self.fleet.period_s,
+        )
+        self.enter(Settling(self.time_s, hindsight))
 
     def enter(self, phase: AnyPhase) -> None:
         if phase.name != self.phase.name:

@@ -5,7 +5,7 @@ are seen, and never drawn towards the suspect's own reports: those are what is b
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +13,13 @@ from numpy.typing import NDArray
 from base_station import diagnosis, twin
 from base_station.diagnosis import Fit, Verdict
 from base_station.execution import Orders
-from base_station.hypotheses import NONE, Hypothesis
+from base_station.hypotheses import Hypothesis
 from base_station.telemetry import Frame
-from base_station.watch import CORRECTION_TIME_S, Baseline, Moment, correct
+from base_station.watch import CORRECTION_TIME_S, Baseline, correct
 
 Array = NDArray[np.float64]
 
 FLOOR = 1e-3  # 'something else' is never ruled out before an experiment
-ONSET_STEP_S = 0.3
-MAX_ONSETS = 20
-ONSET_MARGIN_S = 1.0  # a fault may have been there before the statistic moved
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +74,7 @@ class Doubt:
 
 def tick(doubt: Doubt, frame: Frame, orders: Orders, period_s: float) -> Doubt:
     """Move every twin on by one telemetry period, and judge the suspect's report when it is due."""
-    return _advanced(doubt, doubt.faults, frame, orders, period_s)
+    return advanced(doubt, doubt.faults, frame, orders, period_s)
 
 
 def anchor(doubt: Doubt, report_m: Array) -> Doubt:
@@ -117,71 +114,10 @@ def narrowed(doubt: Doubt, keep: Sequence[int]) -> tuple[tuple[Hypothesis, ...],
     return tuple(doubt.twins[k] for k in keep), p / p.sum(), doubt.states[list(keep)]
 
 
-def open_doubt(
-    baseline: Baseline,
-    memory: Sequence[Moment],
-    suspect: int,
-    candidates: Sequence[Hypothesis],
-    between_s: tuple[float, float],
-    period_s: float,
-) -> Doubt:
-    """Replay the memory from the last healthy moment under every candidate.
-
-    When exactly the fault struck is unknown, somewhere in `between_s` (last quiet, alarm): each
-    hypothesis is replayed for several onsets, and its evidence is the mean of their likelihoods.
-    """
-    hypotheses = tuple(sorted(candidates, key=lambda h: not h.has_twin))
-    twins = tuple(h for h in hypotheses if h.has_twin)
-    start_s = between_s[0] - ONSET_MARGIN_S
-    times = np.array([m.frame.time_s for m in memory])
-    first, *replayed = memory[max(0, int(np.searchsorted(times, start_s)) - 1) :]
-    onsets = _onsets(first.frame.time_s, between_s[1])
-    struck = baseline.faults(twins * len(onsets))
-    sound = baseline.faults([Hypothesis(NONE, h.sysid, 1.0) for h in twins * len(onsets)])
-    onset_of_row = np.repeat(onsets, len(twins))
-    rows = Doubt(
-        baseline=baseline,
-        suspect=suspect,
-        hypotheses=twins * len(onsets),
-        prior=np.zeros(len(onset_of_row)),
-        states=np.repeat(first.state[None], len(onset_of_row), axis=0),
-        fit=diagnosis.fresh_fit(len(onset_of_row)),
-        unknown=0.0,
-        last_report_m=np.asarray(first.frame.position_m[suspect]),
-        judged_s=first.frame.time_s,
-    )
-    active = np.zeros(len(onset_of_row), dtype=np.bool_)
-    for moment in replayed:
-        strikes = ~active & (moment.frame.time_s - period_s >= onset_of_row - 1e-6)
-        rows.states[strikes, suspect, twin.HELD_NORTH : twin.HELD_EAST + 1] = rows.states[
-            strikes, suspect, twin.NORTH : twin.EAST + 1
-        ]
-        active |= strikes
-        faults = twin.FaultArrays(
-            np.where(active[:, None, None], struck.power, sound.power),
-            np.where(active[:, None, None], struck.gps_stuck, sound.gps_stuck),
-        )
-        rows = _advanced(rows, faults, moment.frame, moment.orders, period_s)
-    by_onset = rows.fit.log_likelihood.reshape(len(onsets), len(twins))
-    chosen = by_onset.argmax(axis=0) * len(twins) + np.arange(len(twins))
-    fit = Fit(*(getattr(rows.fit, f.name)[chosen] for f in fields(Fit)))
-    return replace(
-        rows,
-        hypotheses=hypotheses,
-        prior=np.log([h.prior for h in hypotheses]),
-        states=rows.states[chosen],
-        fit=replace(fit, log_likelihood=_log_mean_exp(by_onset)),
-    )
-
-
-def _onsets(first_s: float, last_s: float) -> Array:
-    count = int(np.clip((last_s - first_s) / ONSET_STEP_S + 1, 1, MAX_ONSETS))
-    return np.linspace(first_s, last_s, count)
-
-
-def _advanced(
+def advanced(
     doubt: Doubt, faults: twin.FaultArrays, frame: Frame, orders: Orders, period_s: float
 ) -> Doubt:
+    """As `tick`, under fault rows that may differ from those of the hypotheses."""
     suspect = doubt.suspect
     before_m = twin.report(doubt.states, faults)[:, suspect]
     states = _move(doubt.baseline, faults, doubt.states, suspect, frame, orders, period_s)
@@ -223,10 +159,3 @@ def _move(
     trusted = faults.gps_stuck < 0.5
     trusted[:, suspect] = False
     return correct(moved.states, frame, trusted, period_s / CORRECTION_TIME_S)
-
-
-def _log_mean_exp(values: Array) -> Array:
-    """Over the first axis."""
-    top = values.max(axis=0)
-    mean: Array = np.exp(values - top).mean(axis=0)
-    return np.asarray(top + np.log(mean))

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from base_station.execution import Orders
+from base_station.hindsight import Hindsight
 from base_station.planning.requests import OpenLoopPlan, PolicyWeights
 from base_station.records import Phase
 
@@ -30,13 +31,12 @@ class Probing:
     name: Phase = "probe"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Settling:
-    """All in HOLD until the fleet is at rest; then [0b], the doubt about `suspect` is opened."""
+    """All in HOLD until the fleet is at rest; then [0b], the doubt about a suspect is opened."""
 
     since_s: float
-    suspect: int
-    struck_between_s: tuple[float, float]  # last quiet moment, alarm
+    hindsight: Hindsight
     name: Phase = "probe"
 
 

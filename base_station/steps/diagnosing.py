@@ -9,29 +9,24 @@ from base_station import execution
 from base_station.desk import Desk
 from base_station.diagnosis import Verdict
 from base_station.execution import Orders
-from base_station.hypotheses import NONE, UNKNOWN, candidates
+from base_station.hypotheses import NONE, UNKNOWN
 from base_station.phases import Concluding, Experimenting, PlanningAlpha, Settling
 from base_station.steps.travelling import request_beta
 from base_station.telemetry import Frame
 from base_station.watch import Watch
 
 EXPERIMENT_MIN_S = 1.0
+MOMENTS_PER_TICK = 15  # of the memory, each about 0.3 ms: a step must not take 10 ms
 PLANNABLE_POSTERIOR = 0.005  # explanations less likely than this are not worth a contact
 
 
 def settle(desk: Desk, phase: Settling, frame: Frame) -> Orders:
     """[0b] At rest: replay the memory under every hypothesis; decide, or ask for plan alpha."""
-    if frame.time_s - phase.since_s < execution.REST_S:
+    caught_up = phase.hindsight.take(tuple(desk.watch.memory), MOMENTS_PER_TICK)
+    if frame.time_s - phase.since_s < execution.REST_S or not caught_up:
         return desk.hold()
-    member = desk.view.fleet[phase.suspect]
-    opened = doubts.open_doubt(
-        desk.watch.baseline,
-        tuple(desk.watch.memory),
-        phase.suspect,
-        candidates(member, desk.view.diagnosis.priors),
-        phase.struck_between_s,
-        desk.fleet.period_s,
-    )
+    opened = phase.hindsight.doubt()
+    member = desk.view.fleet[opened.suspect]
     desk.doubt = doubts.anchor(opened, desk.mean_report_m())
     posterior = opened.verdict(desk.view.diagnosis.decide_at).posterior
     desk.say("hypotheses", f"{member.name}: {_shown(posterior)}", posterior=posterior)

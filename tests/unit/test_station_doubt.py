@@ -7,6 +7,7 @@ from base_station import doubt as doubts
 from base_station import twin
 from base_station.diagnosis import SAMPLE_PERIOD_S
 from base_station.execution import Orders, hold, probe_pulses, pulse_at, pulse_orders
+from base_station.hindsight import Hindsight
 from base_station.hypotheses import Hypothesis, candidates, nominal
 from base_station.telemetry import Frame
 from base_station.watch import Baseline, Watch
@@ -63,7 +64,7 @@ def _probe(view: StationView, name: str, seed: int = 0) -> tuple[Plant, Watch, s
 
 
 def _open(view: StationView, watch: Watch) -> doubts.Doubt:
-    return doubts.open_doubt(
+    hindsight = Hindsight(
         watch.baseline,
         tuple(watch.memory),
         SUSPECT,
@@ -71,6 +72,9 @@ def _open(view: StationView, watch: Watch) -> doubts.Doubt:
         (2.0, 12.0),
         PERIOD_S,
     )
+    while not hindsight.take(tuple(watch.memory), most=7):
+        pass
+    return hindsight.doubt()
 
 
 @pytest.mark.parametrize("name", ["motor_y_off", "gps_east_stuck"])
