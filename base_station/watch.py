@@ -87,7 +87,7 @@ class Watch:
     """Runs the believed twin tick by tick. `level` is compared with `threshold` for an alarm."""
 
     def __init__(self, view: StationView, baseline: Baseline, state: Array, time_s: float) -> None:
-        self._view, self.baseline = view, baseline
+        self.baseline = baseline
         self._faults = baseline.faults((_nothing_more(view),))
         self._trusted = self._faults.gps_stuck < 0.5
         self._period_s = 1.0 / view.clock.telemetry_hz
