@@ -1,0 +1,57 @@
+"""Scenario files: the YAML schema, loading with messages for people, and the station's view.
+
+`Scenario` is all there is to know; `StationView` is the part a real ground station would have.
+Units are in the field names; positions are local NED metres from `origin`.
+"""
+
+from hil.scenario.faults import FaultModel, Onset
+from hil.scenario.fields import PORTS_PER_VEHICLE
+from hil.scenario.loading import MAX_FILE_BYTES, load_scenario, load_station_view
+from hil.scenario.mission import (
+    MIN_PUSH_MARGIN,
+    Diagnosis,
+    Expectation,
+    GoalOutcome,
+    Limits,
+    Links,
+    Planning,
+    Priors,
+)
+from hil.scenario.places import Arena, Clock, OriginModel, Patch, Point, Slope, Terrain, Wind
+from hil.scenario.schema import Scenario
+from hil.scenario.station import STATION_AIRFRAMES, FleetMember, StationView, station_view
+from hil.scenario.vehicles import Plant, Radio, Sensors, Vehicle
+
+__all__ = [
+    "MAX_FILE_BYTES",
+    "MIN_PUSH_MARGIN",
+    "PORTS_PER_VEHICLE",
+    "STATION_AIRFRAMES",
+    "Arena",
+    "Clock",
+    "Diagnosis",
+    "Expectation",
+    "FaultModel",
+    "FleetMember",
+    "GoalOutcome",
+    "Limits",
+    "Links",
+    "Onset",
+    "OriginModel",
+    "Patch",
+    "Planning",
+    "Plant",
+    "Point",
+    "Priors",
+    "Radio",
+    "Scenario",
+    "Sensors",
+    "Slope",
+    "StationView",
+    "Terrain",
+    "Vehicle",
+    "Wind",
+    "load_scenario",
+    "load_station_view",
+    "station_view",
+]

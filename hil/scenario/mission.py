@@ -1,0 +1,73 @@
+"""What the station is to do and may do, and what must come out."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from hil.scenario.fields import GroundSysId, Horizon, Model, NonNegative, Port, Positive, SysId
+
+MIN_PUSH_MARGIN = 1.5
+
+
+class Priors(Model):
+    """Weight of each family of hypotheses before any evidence; normalised when used."""
+
+    motor: Positive = 0.45
+    gps: Positive = 0.45
+    none: Positive = 0.05
+    unknown: Positive = 0.05
+
+
+class Diagnosis(Model):
+    evidence: Literal["position"] = "position"
+    decide_at: Annotated[float, Field(gt=0.5, lt=1)] = 0.99
+    plan_error: Annotated[float, Field(gt=0, lt=0.5)] = 0.01
+    false_alarms_per_hour: Positive = 0.1
+    tries: Annotated[int, Field(ge=1, le=20)] = 3
+    priors: Priors = Priors()
+
+
+class Planning(Model):
+    """`planner` finds the experiment; the mission is always learned."""
+
+    planner: Literal["ppo", "cem", "shooting", "random", "gradient", "ram"] = "ppo"
+    objective: Literal["paper_distance", "paper_printed", "information"] = "paper_distance"
+    preset: Literal["tuned", "paper"] = "tuned"
+    suspect: Literal["held", "commanded"] = "held"
+    alpha_horizon_s: Horizon = 8.0
+    beta_horizon_s: Horizon = 40.0
+    restarts: Annotated[int, Field(ge=0, le=100)] = 20
+    planning_sim_s: NonNegative = 2.0
+
+
+class Limits(Model):
+    """What the station allows itself."""
+
+    speed_mps: Positive = 1.0
+    probe_speed_mps: Positive = 0.5
+    probe_pulse_s: Annotated[float, Field(gt=0, le=0.5)] = 0.5
+    goal_radius_m: Positive = 0.2
+    mission_timeout_s: Positive = 180.0
+
+
+class Links(Model):
+    """Ports; None lets `hil run` pick free ones. Vehicle i uses base + 10 i."""
+
+    host: str = "127.0.0.1"
+    mavlink_port_base: Port | None = None
+    physics_port_base: Port | None = None
+    injector_port_base: Port | None = None
+    station_sysid: GroundSysId = 250
+    injector_sysid: GroundSysId = 251
+
+
+GoalOutcome = Literal["reached", "uncertain", "unreached"]
+
+
+class Expectation(Model):
+    """What must come out for exit code 0. `hypothesis` is a name as `base_station` writes it."""
+
+    alarm: bool = True
+    sysid: SysId | None = None
+    hypothesis: str | None = None
+    goals: dict[SysId, tuple[GoalOutcome, ...]] = Field(default={})

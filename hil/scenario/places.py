@@ -1,0 +1,92 @@
+"""Where things are, and what everybody there has to live with: clock, wind, slope."""
+
+import itertools
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from hil.frames import Origin
+from hil.scenario.fields import Finite, Metres, Model
+
+
+class OriginModel(Model):
+    lat_deg: Annotated[float, Field(ge=-85, le=85)] = 47.397742
+    lon_deg: Annotated[float, Field(ge=-180, le=180)] = 8.545594
+    alt_m: Finite = 488.0
+
+    def origin(self) -> Origin:
+        return Origin(self.lat_deg, self.lon_deg, self.alt_m)
+
+
+class Arena(Model):
+    """A rectangle with solid walls."""
+
+    north_min_m: Metres
+    north_max_m: Metres
+    east_min_m: Metres
+    east_max_m: Metres
+
+    @model_validator(mode="after")
+    def _has_an_inside(self) -> Self:
+        if self.north_min_m >= self.north_max_m or self.east_min_m >= self.east_max_m:
+            raise ValueError("the arena is empty: each *_min_m must be below its *_max_m")
+        return self
+
+    def contains(self, point: "Point", margin_m: float = 0.0) -> bool:
+        return (
+            self.north_min_m + margin_m <= point.north_m <= self.north_max_m - margin_m
+            and self.east_min_m + margin_m <= point.east_m <= self.east_max_m - margin_m
+        )
+
+
+class Point(Model):
+    north_m: Metres
+    east_m: Metres
+
+
+class Clock(Model):
+    """Rates of the whole testbed (Hz); each slower one must divide the next faster one."""
+
+    physics_hz: Annotated[int, Field(ge=50, le=1200)] = 200
+    autopilot_hz: Annotated[int, Field(ge=10, le=400)] = 50
+    telemetry_hz: Annotated[int, Field(ge=1, le=50)] = 10
+    setpoint_hz: Annotated[int, Field(ge=1, le=50)] = 10
+    control_hz: Annotated[int, Field(ge=1, le=10)] = 2
+
+    @model_validator(mode="after")
+    def _rates_divide(self) -> Self:
+        chain = ("physics_hz", "autopilot_hz", "telemetry_hz", "control_hz")
+        for fast, slow in itertools.pairwise(chain):
+            if getattr(self, fast) % getattr(self, slow):
+                raise ValueError(
+                    f"{slow} = {getattr(self, slow)} must divide {fast} = {getattr(self, fast)}"
+                )
+        return self
+
+
+class Wind(Model):
+    """Where the air goes to, steadily."""
+
+    north_mps: Annotated[float, Field(ge=-50, le=50)] = 0.0
+    east_mps: Annotated[float, Field(ge=-50, le=50)] = 0.0
+
+
+class Slope(Model):
+    """Rise of the ground per metre to the north and to the east."""
+
+    north: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
+    east: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
+
+
+class Patch(Arena):
+    """A rectangle where rolling resistance and grip are multiplied by `friction`."""
+
+    friction: Annotated[float, Field(ge=0, le=20)]
+
+
+class Terrain(Model):
+    """What the world does to everybody. Truth only; where patches overlap, the first counts."""
+
+    wind: Wind = Wind()
+    slope: Slope = Slope()
+    patches: Annotated[tuple[Patch, ...], Field(max_length=100)] = ()

@@ -1,0 +1,114 @@
+"""The station's view: the part of a scenario that a real ground station would have."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from hil import airframe as airframes
+from hil.airframe import Airframe
+from hil.errors import InputError
+from hil.scenario.checks import keep_inside, unique
+from hil.scenario.fields import (
+    PORTS_PER_VEHICLE,
+    Finite,
+    GroundSysId,
+    Model,
+    Port,
+    Seed,
+    SysId,
+    VehicleName,
+)
+from hil.scenario.mission import Diagnosis, Limits, Planning
+from hil.scenario.places import Arena, Clock, OriginModel, Point
+from hil.scenario.schema import Scenario
+from hil.scenario.vehicles import Sensors
+
+STATION_AIRFRAMES = ("omni_plus",)  # those that the station's twin can be
+
+
+def _twinned_airframe(name: str) -> str:
+    if name not in STATION_AIRFRAMES:
+        known = ", ".join(STATION_AIRFRAMES)
+        raise ValueError(f"the base station has no twin of that; it knows {known}")
+    return name
+
+
+class FleetMember(Model):
+    """What the station knows of a vehicle."""
+
+    name: VehicleName
+    sysid: SysId
+    airframe: Annotated[str, AfterValidator(_twinned_airframe)]
+    start_yaw_deg: Finite
+    goal: Point
+    mavlink_port: Port
+
+    @property
+    def frame(self) -> Airframe:
+        return airframes.AIRFRAMES[self.airframe]
+
+
+class StationView(Model):
+    """All that the base station is told. No truth, no faults, no seed of the world, no name."""
+
+    origin: OriginModel
+    arena: Arena
+    yaw: Literal["locked", "free"]
+    clock: Clock
+    fleet: Annotated[tuple[FleetMember, ...], Field(min_length=1, max_length=100)]
+    sensors: Sensors
+    diagnosis: Diagnosis
+    planning: Planning
+    limits: Limits
+    host: str
+    station_sysid: GroundSysId
+    station_seed: Seed
+
+    @model_validator(mode="after")
+    def _hangs_together(self) -> Self:
+        sysids = [m.sysid for m in self.fleet]
+        unique("fleet.sysid", sysids)
+        unique("fleet.name", [m.name for m in self.fleet])
+        unique("fleet.mavlink_port", [m.mavlink_port for m in self.fleet])
+        if self.station_sysid in sysids:
+            raise ValueError(f"station_sysid = {self.station_sysid} is also a vehicle's")
+        keep_inside(self.arena, "goal", self.fleet)
+        return self
+
+
+def station_view(scenario: Scenario, mavlink_port_base: int, station_seed: int) -> StationView:
+    """The part of a scenario that a ground station would have been told.
+
+    Raises InputError for an airframe that the station has no twin of.
+    """
+    for v in scenario.fleet:
+        if v.airframe not in STATION_AIRFRAMES:
+            raise InputError(
+                f"{scenario.name}: {v.name} is a {v.airframe}, and the base station has no twin of "
+                f"that yet; it knows {', '.join(STATION_AIRFRAMES)}"
+            )
+    fleet = tuple(
+        FleetMember(
+            name=v.name,
+            sysid=v.sysid,
+            airframe=v.airframe,
+            start_yaw_deg=v.start_yaw_deg,
+            goal=v.goal,
+            mavlink_port=mavlink_port_base + PORTS_PER_VEHICLE * i,
+        )
+        for i, v in enumerate(scenario.fleet)
+    )
+    return StationView(
+        origin=scenario.origin,
+        arena=scenario.arena,
+        yaw=scenario.yaw,
+        clock=scenario.clock,
+        fleet=fleet,
+        sensors=scenario.sensors,
+        diagnosis=scenario.diagnosis,
+        planning=scenario.planning,
+        limits=scenario.limits,
+        host=scenario.links.host,
+        station_sysid=scenario.links.station_sysid,
+        station_seed=station_seed,
+    )

@@ -1,0 +1,71 @@
+"""The vehicles of a fleet, their radios and sensors, and how far they are from the data sheet."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from hil import airframe as airframes
+from hil.airframe import Airframe
+from hil.scenario.fields import (
+    AirframeName,
+    Finite,
+    Model,
+    NonNegative,
+    Positive,
+    Seconds,
+    Share,
+    SysId,
+    VehicleName,
+)
+from hil.scenario.places import Point
+
+
+class Radio(Model):
+    """What a MAVLink link does to datagrams, in each direction. Truth only.
+
+    `jitter_s` adds up to so much to the delay and keeps the order; `reordering` and `duplication`
+    are shares of datagrams that come, or come again, 0.2 s late.
+    """
+
+    loss: Share = 0.0
+    delay_s: Seconds = 0.0
+    jitter_s: Seconds = 0.0
+    duplication: Share = 0.0
+    reordering: Share = 0.0
+
+
+class Vehicle(Model):
+    name: VehicleName
+    sysid: SysId
+    airframe: AirframeName = "omni_plus"
+    start: Point
+    start_yaw_deg: Finite = 0.0
+    goal: Point
+    radio: Radio | None = None  # None: the scenario's
+
+    @property
+    def frame(self) -> Airframe:
+        return airframes.AIRFRAMES[self.airframe]
+
+
+class Sensors(Model):
+    """Declared noise, known to the station (data sheet): RTK-class GPS, MEMS gyro."""
+
+    gps_hz: Annotated[int, Field(ge=1, le=50)] = 10
+    gps_position_sigma_m: Positive = 0.02
+    gps_wander_sigma_m: NonNegative = 0.01
+    gps_wander_time_s: Positive = 20.0
+    gps_velocity_sigma_mps: Positive = 0.05
+    gyro_sigma_radps: Positive = 0.005
+    compass_sigma_rad: Positive = 0.01
+    accel_sigma_mps2: Positive = 0.05
+    level_sigma_rad: Positive = 0.002
+
+
+class Plant(Model):
+    """How far the world may be from the data sheet: one draw per vehicle and seed. Truth only."""
+
+    motor_gain_sigma: NonNegative = 0.03
+    mass_sigma: NonNegative = 0.02
+    rolling_sigma: NonNegative = 0.10
+    contact_friction: NonNegative = 0.2
