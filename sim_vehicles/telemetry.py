@@ -1,6 +1,7 @@
 """Telemetry: a snapshot of the vehicle to messages (pure)."""
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -29,6 +30,8 @@ from hil.mavlink import (
     Heartbeat,
     HomePosition,
     LocalPosition,
+    Message,
+    MessageId,
     MissionCurrent,
     RawImu,
     RcChannels,
@@ -252,3 +255,27 @@ def autopilot_version(s: Snapshot) -> AutopilotVersion:
         | Capability.MAVLINK2
     )
     return AutopilotVersion(int(capabilities), VERSION, s.sysid)
+
+
+BUILDERS: Mapping[MessageId, Callable[[Snapshot], Message | None]] = {
+    MessageId.HEARTBEAT: heartbeat,
+    MessageId.SYS_STATUS: sys_status,
+    MessageId.GPS_RAW_INT: gps_raw,
+    MessageId.GLOBAL_POSITION_INT: global_position,
+    MessageId.LOCAL_POSITION_NED: local_position,
+    MessageId.ATTITUDE: attitude,
+    MessageId.SERVO_OUTPUT_RAW: servo_outputs,
+    MessageId.BATTERY_STATUS: battery_status,
+    MessageId.EXTENDED_SYS_STATE: extended_sys_state,
+    MessageId.HOME_POSITION: home_position,
+    MessageId.GPS_GLOBAL_ORIGIN: gps_origin,
+    MessageId.MISSION_CURRENT: mission_current,
+    MessageId.AUTOPILOT_VERSION: autopilot_version,
+    MessageId.FENCE_STATUS: fence_status,
+    MessageId.RAW_IMU: raw_imu,
+    MessageId.SCALED_IMU: scaled_imu,
+    MessageId.EKF_STATUS_REPORT: ekf_status,
+    MessageId.ESC_TELEMETRY_1_TO_4: esc_telemetry,
+    MessageId.VFR_HUD: vfr_hud,
+    MessageId.RC_CHANNELS: rc_channels,
+}

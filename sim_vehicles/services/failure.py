@@ -31,7 +31,7 @@ class FailureService:
     """Holds the faults in effect."""
 
     def __init__(self, sizes: Parameters, airframe: Airframe) -> None:
-        self._sizes, self._airframe = sizes, airframe
+        self.sizes, self._airframe = sizes, airframe
         self.active = Damage.none(airframe)
 
     def executors(self) -> Mapping[int, Executor]:
@@ -41,12 +41,12 @@ class FailureService:
         unit, kind, instances = order.integer(1), order.integer(2), _instances(order)
         if (unit, kind) not in _POSSIBLE or unit is None or kind is None:
             return UNSUPPORTED
-        if not self._sizes[GATE]:
+        if not self.sizes[GATE]:
             return Outcome(Result.DENIED, (_text(f"{GATE} is 0"),))
         if instances is None or self._is_impossible(unit, kind):
             return DENIED
         damage: Damage | None = self.active
-        sizes = {name: self._sizes[name] for name in self._sizes.names}
+        sizes = {name: self.sizes[name] for name in self.sizes.names}
         for instance in instances:
             damage = damage and inject(damage, unit, kind, instance, sizes, order.now_s)
         if damage is None:
@@ -59,13 +59,13 @@ class FailureService:
 
     def _is_impossible(self, unit: int, kind: int) -> bool:
         """A propeller that lifts can't be driven backwards: its controller has no reverse."""
-        reverses = unit == Unit.MOTOR and kind == FailureType.WRONG and self._sizes[ENGINE_MUL] < 0
+        reverses = unit == Unit.MOTOR and kind == FailureType.WRONG and self.sizes[ENGINE_MUL] < 0
         return reverses and not all(m.reversible for m in self._airframe.motors)
 
     def _forget_sizes(self, unit: int) -> None:
         for owner, size in size_parameters():
             if owner == unit:
-                self._sizes.set(size.parameter, size.default)
+                self.sizes.set(size.parameter, size.default)
 
 
 def _text(words: str) -> Message:

@@ -41,6 +41,24 @@ GROUPS: Mapping[int, tuple[MessageId, ...]] = {
 }
 
 
+def default_rates_hz(telemetry_hz: float) -> dict[int, float]:
+    """What streams unprompted on the station's port; all else only when asked for."""
+    return {
+        MessageId.HEARTBEAT: 1.0,
+        MessageId.SYS_STATUS: 1.0,
+        MessageId.GPS_RAW_INT: 2.0,
+        MessageId.GLOBAL_POSITION_INT: 2.0,
+        MessageId.LOCAL_POSITION_NED: telemetry_hz,
+        MessageId.ATTITUDE: telemetry_hz,
+        MessageId.SERVO_OUTPUT_RAW: 2.0,
+        MessageId.BATTERY_STATUS: 0.5,
+        MessageId.EXTENDED_SYS_STATE: 1.0,
+        MessageId.HOME_POSITION: 0.5,
+        MessageId.GPS_GLOBAL_ORIGIN: 0.5,
+        MessageId.MISSION_CURRENT: 1.0,
+    }
+
+
 class StreamService:
     """Builds messages when they are due. Times are multiples of the interval, so fleets align."""
 

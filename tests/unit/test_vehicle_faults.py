@@ -304,7 +304,7 @@ def test_accelerometer_bias_and_noise(rover: InWorld) -> None:
         samples = []
         for _ in range(100):
             rover.run(0.02, {1: REST})
-            sample = rover.vehicles[1]._sample
+            sample = rover.vehicles[1]._senses.sample
             assert sample is not None
             samples.append(sample.accel_mps2[0])
         return samples
