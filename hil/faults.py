@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 
 GATE = "SYS_FAILURE_EN"  # PX4's name; 0 (default) refuses every injection
+ANNOUNCE = "SIM_FAIL_TELL"  # ours; 1: the vehicle notices, and says so; 0 (default): silent
 NED_AXES = ("north", "east", "down")
 
 
@@ -174,7 +175,7 @@ class Injection:
     commands: tuple[tuple[int, int, int], ...]  # (unit, type, instance) of MAV_CMD_INJECT_FAILURE
 
 
-def to_injection(fault: Fault) -> Injection:
+def to_injection(fault: Fault, announced: bool = False) -> Injection:
     """The MAVLink way to make `fault` happen: all of it, the gate included."""
     kind = KINDS[fault.unit, fault.type]
     sizes = zip(kind.sizes, fault.size, strict=True)
@@ -183,6 +184,7 @@ def to_injection(fault: Fault) -> Injection:
         *(((GPS_STUCK, float(fault.axes_mask or 7)),) if _is_stuck_gps(fault) else ()),
         *kind.fixed,
         *((size.parameter, value * size.scale) for size, value in sizes),
+        (ANNOUNCE, float(announced)),
     )
     number = int(kind.failure_type)
     commands = tuple((int(fault.unit), number, i) for i in fault.instances or (0,))
@@ -209,3 +211,8 @@ def size_parameters() -> tuple[tuple[Unit, Size], ...]:
     named = {size.parameter for _, size in own}
     carried = {s.parameter: (u, s) for (u, _), k in KINDS.items() for s in k.sizes}
     return own + tuple(pair for name, pair in carried.items() if name not in named)
+
+
+def default_sizes() -> dict[str, float]:
+    """Every parameter that an injection reads, as it stands before any is set."""
+    return {ANNOUNCE: 0.0} | {size.parameter: size.default for _, size in size_parameters()}

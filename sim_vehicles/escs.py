@@ -1,15 +1,16 @@
 """What the speed controllers report (pure).
 
-They report the outputs as commanded, so a broken motor is silent here, too; a fault of the
-telemetry itself is what `EscDamage` says.
+They report the outputs as they see them: as commanded, so that a broken motor is silent here, too,
+unless its fault is announced (`MotorOutputs.told`). A fault of the telemetry itself is what
+`EscDamage` says.
 """
 
 from collections.abc import Sequence
 
 from hil.airframe import Airframe, pwm_to_output
+from hil.damage import EscDamage
 from hil.mavlink import Esc, EscTelemetry
 from sim_vehicles.battery import BatteryState, loads
-from sim_vehicles.damage import EscDamage
 
 FULL_RPM = 3000  # at full output, without load
 REPORTS_HZ = 10.0

@@ -1,8 +1,8 @@
 """What a vehicle feels: inertial sensors and GPS, faults included, and the estimate of both."""
 
+from hil.damage import Damage
 from hil.physics_link import PhysicsState
 from hil.scenario import Sensors
-from sim_vehicles.damage import Damage
 from sim_vehicles.estimator import Estimate, Estimator
 from sim_vehicles.innovation import Innovation, innovation
 from sim_vehicles.sensors import Gps, GpsFix, Inertial, InertialSensors, Vector

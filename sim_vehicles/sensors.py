@@ -5,23 +5,21 @@ a fault adds comes from streams of their own, which are drawn from whether or no
 """
 
 import math
-from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hil.airframe import GRAVITY_MPS2
+from hil.damage import GpsDamage, GpsMeans, ImuDamage
 from hil.faults import REPEAT_BIT
 from hil.physics_link import PhysicsState
 from hil.scenario import Sensors as Noise
-from sim_vehicles.damage import GpsDamage, ImuDamage
 
 Vector = tuple[float, float, float]
 _GYRO_STREAM, _GPS_STREAM = 0x4759524F, 0x475053
 _ACCEL_STREAM, _IMU_EXTRA_STREAM, _GPS_EXTRA_STREAM = 0x4143434C, 0x494D5558, 0x47505358
 _BLOCK = 256
-_LONGEST_LAG_S = 10.0
 _WHOLE = GpsDamage()
 _SOUND = ImuDamage()
 
@@ -104,13 +102,12 @@ class Gps:
         self._keep = math.exp(-self._period_s / noise.gps_wander_time_s)
         self._kick_m = noise.gps_wander_sigma_m * math.sqrt(1.0 - self._keep**2)
         self._wander_m = [noise.gps_wander_sigma_m * z for z in next(self._rows)[:3]]
-        self._frozen: dict[int, tuple[float, float]] = {}  # axis: mean position and velocity
-        self._past: deque[PhysicsState] = deque()  # for a receiver that lags
+        self._means = GpsMeans()
         self._last: GpsFix | None = None
 
     def sample(self, state: PhysicsState, damage: GpsDamage = _WHOLE) -> GpsFix | None:
         """The fix at this step if one is due, and the receiver gives it."""
-        means = self._means(self._lagged(state, damage.lag_s), damage, state.time_s)
+        means = self._means.at(state, damage)
         if state.time_s + 1e-6 < self._due_s:
             return None
         self._due_s = (math.floor(state.time_s / self._period_s + 1e-6) + 1) * self._period_s
@@ -139,37 +136,3 @@ class Gps:
             position = (n + extra_m * extra[0], e + extra_m * extra[1], d + extra_m * extra[2])
         velocity = (vn + sigma_mps * z[3], ve + sigma_mps * z[4], vd + sigma_mps * z[5])
         return GpsFix(time_s, position, velocity)
-
-    def _lagged(self, state: PhysicsState, lag_s: float) -> PhysicsState:
-        """The state that a receiver sees which is that much late."""
-        past = self._past
-        past.append(state)
-        while past[0].time_s < state.time_s - _LONGEST_LAG_S - 1e-6:
-            past.popleft()
-        if lag_s <= 0.0:
-            return state
-        old = [s for s in past if s.time_s <= state.time_s - lag_s + 1e-6]
-        return old[-1] if old else past[0]
-
-    def _means(
-        self, seen: PhysicsState, damage: GpsDamage, now_s: float
-    ) -> list[tuple[float, float]]:
-        """Position and velocity per NED axis, before noise."""
-        means = list(zip(seen.position_m, seen.velocity_mps, strict=True))
-        if damage is _WHOLE or damage == _WHOLE:
-            self._frozen.clear()
-            return means
-        return [self._mean(axis, *means[axis], damage, now_s) for axis in range(3)]
-
-    def _mean(
-        self, axis: int, m: float, mps: float, damage: GpsDamage, now_s: float
-    ) -> tuple[float, float]:
-        glitch_mps, drift_mps = damage.glitch_mps[axis], damage.drift_mps[axis]
-        m += damage.offset_m[axis]
-        m += glitch_mps * (now_s - damage.glitch_since_s)
-        m += drift_mps * (now_s - damage.drift_since_s)
-        now = (m, mps + glitch_mps)
-        if damage.stuck_mask >> axis & 1:
-            return self._frozen.setdefault(axis, now)
-        self._frozen.pop(axis, None)
-        return now

@@ -51,6 +51,7 @@ from sim_vehicles.sensors import GpsFix, Inertial, Vector
 from sim_vehicles.services.piloting import Sticks
 
 SATELLITES, HDOP = 18, 0.7
+FEW_SATELLITES, POOR_HDOP = 4, 10.0  # of a receiver that knows that it is not to be trusted
 CPU_LOAD = 0.25
 VERSION = (4, 6, 0, 255)  # the ArduPilot release whose behaviour is followed; 255 is 'official'
 _MODE_FLAGS = {
@@ -71,6 +72,7 @@ _EKF_WITH_GPS = (
     | EkfFlag.PRED_POS_HORIZ_REL
     | EkfFlag.PRED_POS_HORIZ_ABS
 )
+ALL_WELL = Sensor(0)
 _WHEN_READY = Sensor.AHRS | Sensor.PREARM_CHECK
 
 
@@ -84,7 +86,7 @@ class LandedState(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """All that telemetry may tell. There is no fault in it, so none can be told."""
+    """All that telemetry may tell: of faults only which part has noticed one (`unhealthy`)."""
 
     sysid: int
     now_s: float
@@ -104,6 +106,7 @@ class Snapshot:
     sticks: Sticks
     flies: bool = False
     landed: LandedState = LandedState.ON_GROUND
+    unhealthy: Sensor = ALL_WELL
 
 
 def heartbeat(s: Snapshot) -> Heartbeat:
@@ -128,6 +131,7 @@ def sys_status(s: Snapshot) -> SysStatus:
         present |= int(Sensor.GEOFENCE)
     if s.fence is None or not s.fence.breached:
         health |= int(Sensor.GEOFENCE)  # a fence that is switched off is healthy, too
+    health &= ~int(s.unhealthy)
     battery = (s.battery.voltage_v, s.battery.current_a, s.battery.remaining_percent)
     return SysStatus(present, present, health, CPU_LOAD, *battery)
 
@@ -139,6 +143,8 @@ def gps_raw(s: Snapshot) -> GpsRaw:
     lat, lon = ned_to_wgs84(n, e, s.origin)
     motion = (math.hypot(vn, ve), math.atan2(ve, vn))
     where = (lat, lon, s.origin.alt_m - d)
+    if Sensor.GPS in s.unhealthy:
+        return GpsRaw(s.fix.time_s, FixType.FIX_3D, *where, POOR_HDOP, *motion, FEW_SATELLITES)
     return GpsRaw(s.fix.time_s, FixType.RTK_FIXED, *where, HDOP, *motion, SATELLITES)
 
 
@@ -215,6 +221,8 @@ def _inertial(sample: Inertial) -> tuple[Vector, Vector, Vector]:
 def ekf_status(s: Snapshot) -> EkfStatus:
     placed = s.ready and s.fix is not None
     flags = _EKF_ALWAYS | (_EKF_WITH_GPS if placed else EkfFlag.CONST_POS_MODE)
+    if Sensor.GPS in s.unhealthy:
+        flags = (flags & ~EkfFlag.POS_HORIZ_ABS) | EkfFlag.GPS_GLITCHING
     return EkfStatus(
         s.innovation.velocity, s.innovation.position, s.innovation.height, 0.0, int(flags)
     )

@@ -9,13 +9,14 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 
 from hil.airframe import output_to_pwm
+from hil.damage import MotorOutputs
 from hil.mavlink import HomePosition, Message, MessageId, Severity, Signing, StatusText
 from hil.physics_link import PhysicsState, pad_channels
 from hil.scenario import Scenario
 from sim_vehicles import telemetry
+from sim_vehicles.announcing import unhealthy
 from sim_vehicles.battery import BatteryState, drain, loads
 from sim_vehicles.control import Drive
-from sim_vehicles.damage import MotorOutputs
 from sim_vehicles.escs import esc_telemetry
 from sim_vehicles.guard import Guard
 from sim_vehicles.helm import Helm
@@ -150,10 +151,11 @@ class Vehicle:
         if self._now_s is None or state.time_s > last_s:
             self._now_s = state.time_s
             self._frame(state, state.time_s - last_s)
-        # motors break after reporting, so that a motor fault is silent
+        # motors break after reporting, so that a motor fault is silent unless announced
         return self._outputs.broken(self._failures.active.motors, self._pwm, self.time_s)
 
     def _frame(self, state: PhysicsState, dt_s: float) -> None:
+        self._tell(self._failures.news())
         if self._senses.feel(state, dt_s, self._failures.active):
             self._tell((StatusText(Severity.INFO, "Position estimate ready"),))
         mode, voltage_v = self._helm.autopilot.mode, self._battery.voltage_v
@@ -190,7 +192,8 @@ class Vehicle:
 
     def _snapshot(self) -> Snapshot:
         now_s, airframe = self.time_s, self._drive.airframe
-        damage = self._failures.active.escs
+        damage = self._failures.active
+        pwm_seen_us = self._outputs.told(damage.motors, self._pwm)
         return Snapshot(
             sysid=self._sysid,
             now_s=now_s,
@@ -206,8 +209,9 @@ class Vehicle:
             fence=self._guard.fence(),
             inertial=self._senses.sample,
             innovation=self._senses.innovation,
-            escs=esc_telemetry(airframe, self._pwm, damage, self._battery, now_s),
+            escs=esc_telemetry(airframe, pwm_seen_us, damage.escs, self._battery, now_s),
             sticks=self._piloting.sticks,
             flies=airframe.flight is not None,
             landed=self._helm.landed_state(),
+            unhealthy=unhealthy(damage),
         )

@@ -96,7 +96,7 @@ class Injector:
         return not self._orders
 
     def add(self, fault: FaultModel) -> None:
-        injection = to_injection(fault.fault())
+        injection = to_injection(fault.fault(), fault.announced)
         self._orders += [SetParameter(name, value) for name, value in injection.parameters]
         self._orders += [InjectFailure(*numbers) for numbers in injection.commands]
 

@@ -28,7 +28,11 @@ class Onset(Model):
 
 
 class FaultModel(Model):
-    """`size` is a number or a vector in the units of docs/faults.md; most types need one."""
+    """`size` is a number or a vector in the units of docs/faults.md; most types need one.
+
+    `announced`: the vehicle notices, and its telemetry says so. `applied_by`: the vehicle itself,
+    told over MAVLink, or the world, for firmware that can't.
+    """
 
     vehicle: SysId
     unit: Literal["motor", "esc", "gps", "gyro", "accel"]
@@ -40,6 +44,7 @@ class FaultModel(Model):
     axes: tuple[Literal["north", "east", "down"], ...] = ()
     size: Numbers = ()
     onset: Onset = Onset(at_s=0.0)
+    announced: bool = False
 
     @model_validator(mode="after")
     def _can_be_injected(self) -> Self:

@@ -9,9 +9,10 @@ import math
 from collections.abc import Mapping
 
 from hil.airframe import Airframe
-from hil.faults import ENGINE_MUL, GATE, KINDS, FailureType, Unit, size_parameters
+from hil.damage import Damage, inject
+from hil.faults import ANNOUNCE, ENGINE_MUL, GATE, KINDS, FailureType, Unit, size_parameters
 from hil.mavlink import Command, Message, ParamType, Result, Severity, StatusText
-from sim_vehicles.damage import Damage, inject
+from sim_vehicles.announcing import announcements
 from sim_vehicles.parameters import Parameter, Parameters
 from sim_vehicles.services.commands import DENIED, UNSUPPORTED, Executor, Order, Outcome
 
@@ -24,7 +25,8 @@ def injection_parameters() -> Parameters:
     """The gate, and the sizes of faults as they stand before any is injected."""
     gate = Parameter(GATE, 0, 0, 1, ParamType.INT8)
     sizes = (Parameter(s.parameter, s.default, s.low, s.high) for _, s in size_parameters())
-    return Parameters((gate, *sizes))
+    announce = Parameter(ANNOUNCE, 0, 0, 1, ParamType.INT8)
+    return Parameters((gate, announce, *sizes))
 
 
 class FailureService:
@@ -32,7 +34,12 @@ class FailureService:
 
     def __init__(self, sizes: Parameters, airframe: Airframe) -> None:
         self.sizes, self._airframe = sizes, airframe
-        self.active = Damage.none(airframe)
+        self.active = self._known = Damage.none(airframe)
+
+    def news(self) -> tuple[StatusText, ...]:
+        """What the vehicle has noticed of its faults since the last call."""
+        before, self._known = self._known, self.active
+        return announcements(before, self.active) if before is not self.active else ()
 
     def executors(self) -> Mapping[int, Executor]:
         return {Command.INJECT_FAILURE: self._inject}

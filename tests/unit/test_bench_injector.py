@@ -8,7 +8,7 @@ from bench_builders import rescue
 from hil.bench.injector import ANSWER_WITHIN_S, RESEND_S, Breaker
 from hil.bench.onsets import Onsets, parse_condition
 from hil.errors import InputError, ProcessDiedError
-from hil.faults import ENGINE_LOCK, GATE
+from hil.faults import ANNOUNCE, ENGINE_LOCK, GATE
 from hil.mavlink import (
     COMPONENT_AUTOPILOT,
     Command,
@@ -61,7 +61,8 @@ def test_each_motor_is_a_command_of_its_own(breaker: Breaker, struck: list[Fault
     breaker.strike([OFF])
     breaker.step(0.0, 2, [])
     breaker.step(0.0, 2, answer(ParamValue(GATE, 1.0, 0, 2)))
-    (first,) = sent(breaker.step(0.0, 2, answer(ParamValue(ENGINE_LOCK, 0.0, 1, 2))))
+    breaker.step(0.0, 2, answer(ParamValue(ENGINE_LOCK, 0.0, 1, 2)))
+    (first,) = sent(breaker.step(0.0, 2, answer(ParamValue(ANNOUNCE, 0.0, 1, 2))))
     assert isinstance(first, CommandLong)
     assert (first.command, first.params[:3]) == (420, (101.0, 1.0, 3.0))
     (second,) = sent(breaker.step(0.1, 2, answer(ack())))
@@ -80,9 +81,19 @@ def test_parameters_go_before_commands(breaker: Breaker, struck: list[FaultModel
     assert isinstance(first, ParamSet)
     assert (first.name, first.value) == ("SIM_GPS1_STUCK", 2.0)
     (second,) = sent(breaker.step(0.1, 2, answer(ParamValue("SIM_GPS1_STUCK", 2.0, 0, 1))))
-    assert second.params[:3] == (4.0, 2.0, 0.0)
+    assert (second.name, second.value) == (ANNOUNCE, 0.0)
+    (third,) = sent(breaker.step(0.1, 2, answer(ParamValue(ANNOUNCE, 0.0, 0, 1))))
+    assert third.params[:3] == (4.0, 2.0, 0.0)
     breaker.step(0.2, 2, answer(ack()))
     assert struck == [STUCK]
+
+
+def test_a_fault_may_be_announced(breaker: Breaker) -> None:
+    breaker.strike([STUCK.model_copy(update={"announced": True})])
+    breaker.step(0.0, 2, [])
+    breaker.step(0.0, 2, answer(ParamValue(GATE, 1.0, 0, 2)))
+    (told,) = sent(breaker.step(0.1, 2, answer(ParamValue("SIM_GPS1_STUCK", 2.0, 0, 1))))
+    assert (told.name, told.value) == (ANNOUNCE, 1.0)
 
 
 def test_an_order_is_repeated_until_it_is_answered(breaker: Breaker) -> None:
@@ -124,7 +135,8 @@ def test_a_refusal_is_named(
 ) -> None:
     breaker.strike([fault])
     breaker.step(0.0, 2, [])
-    for name, value in ((GATE, 1.0), (ENGINE_LOCK, 0.0))[: 2 if fault is OFF else 1]:
+    orders = ((GATE, 1.0), (ENGINE_LOCK, 0.0), (ANNOUNCE, 0.0))
+    for name, value in orders[: 3 if fault is OFF else 1]:
         breaker.step(0.0, 2, answer(ParamValue(name, value, 0, 2)))
     with pytest.raises(InputError, match="rover_2 refuses") as error:
         breaker.step(0.1, 2, answer(refusal))

@@ -4,12 +4,14 @@ import pytest
 from pymavlink.dialects.v20 import all as dialect
 
 from hil.faults import (
+    ANNOUNCE,
     GATE,
     KINDS,
     FailureType,
     Fault,
     Type,
     Unit,
+    default_sizes,
     refusal,
     size_parameters,
     to_clearing,
@@ -41,7 +43,7 @@ def test_numbers_are_mavlinks() -> None:
 def test_every_fault_says_itself_whole(unit: Unit, kind: Type) -> None:
     injection = to_injection(sized(unit, kind))
     assert injection.parameters[0] == (GATE, 1.0)
-    known = {size.parameter for _, size in size_parameters()} | {GATE}
+    known = {GATE, *default_sizes()}
     assert {name for name, _ in injection.parameters} <= known
     assert injection.commands == ((unit, KINDS[unit, kind].failure_type, 0),)
 
@@ -52,17 +54,18 @@ def test_no_two_faults_are_the_same_orders() -> None:
 
 
 def test_parameter_names_fit_and_defaults_break_nothing_twice() -> None:
-    names = [size.parameter for _, size in size_parameters()]
+    names = [ANNOUNCE, *(size.parameter for _, size in size_parameters())]
     assert len(set(names)) == len(names)
     assert all(len(name) <= 16 for name in names)
 
 
 def test_instances_axes_and_sizes_travel() -> None:
     motors = to_injection(Fault(Unit.MOTOR, Type.PARTIAL, (2, 4), size=(0.25,)))
-    assert motors.parameters == ((GATE, 1.0), ("SIM_ENGINE_MUL", 0.25))
+    assert motors.parameters == ((GATE, 1.0), ("SIM_ENGINE_MUL", 0.25), (ANNOUNCE, 0.0))
     assert motors.commands == ((101, 4, 2), (101, 4, 4))
     stuck = to_injection(Fault(Unit.GPS, Type.STUCK, axes=("north", "down")))
-    assert stuck.parameters == ((GATE, 1.0), ("SIM_GPS1_STUCK", 5.0))
+    assert stuck.parameters == ((GATE, 1.0), ("SIM_GPS1_STUCK", 5.0), (ANNOUNCE, 0.0))
+    assert to_injection(Fault(Unit.ESC, Type.OFF), announced=True).parameters[-1] == (ANNOUNCE, 1.0)
     delay = to_injection(Fault(Unit.GPS, Type.DELAY, size=(0.5,)))
     assert delay.parameters[1] == ("SIM_GPS1_LAG_MS", 500.0)
     assert to_clearing(Unit.MOTOR, (3,)).commands == ((101, 0, 3),)

@@ -3,7 +3,7 @@
 import pytest
 from vehicle_harness import Harness
 
-from hil.faults import GATE, size_parameters
+from hil.faults import GATE, default_sizes
 from hil.mavlink import (
     Command,
     CommandAck,
@@ -80,7 +80,7 @@ def test_the_injector_sees_them(rescue: Scenario) -> None:
     rover = Harness(rescue)
     rover.tell(rover.injector.param_request_list(2), "injector")
     names = [p.name for p in rover.values(ParamValue, "injector")]
-    assert names == sorted([GATE, *(size.parameter for _, size in size_parameters())])
+    assert names == sorted([GATE, *default_sizes()])
     rover.tell(rover.injector.param_set(2, "SIM_GPS1_STUCK", 3.0), "injector")
     assert [p.value for p in rover.values(ParamValue, "injector")] == [3.0]
     assert rover.datagrams["gcs"] == []

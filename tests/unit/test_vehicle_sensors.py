@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from hil.damage import GpsDamage
 from hil.physics_link import AT_REST_MPS2, PhysicsState
 from hil.scenario import Sensors
-from sim_vehicles.damage import GpsDamage
 from sim_vehicles.estimator import Estimator
 from sim_vehicles.sensors import Gps, GpsFix, InertialSensors
 

@@ -1,96 +1,33 @@
-"""The faults in effect in one vehicle, and what they do to its motors (pure).
+"""What MAV_CMD_INJECT_FAILURE does to the faults in effect (pure).
 
-`inject` is the state machine behind MAV_CMD_INJECT_FAILURE; sensors and motor outputs read the
-result. Several faults of one unit are in effect together; type OK ends all of them.
+Several faults of one unit are in effect together; type OK ends all of them.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import replace
 
-from hil.airframe import PWM_LOCKED_US, PWM_OFF_US, Airframe, clip_pwm
-from hil.faults import ENGINE_LOCK, ENGINE_MUL, GPS_STUCK, FailureType, Unit
+from hil.damage.state import (
+    ZERO,
+    Damage,
+    EscDamage,
+    Gaps,
+    GpsDamage,
+    ImuDamage,
+    MotorDamage,
+    Vector,
+)
+from hil.faults import (
+    ANNOUNCE,
+    ENGINE_LOCK,
+    ENGINE_MUL,
+    GPS_STUCK,
+    FailureType,
+    Injection,
+    Unit,
+    default_sizes,
+)
 
-Vector = tuple[float, float, float]
 Sizes = Mapping[str, float]
-ZERO: Vector = (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Gaps:
-    """Comes and goes: each period begins with a gap that takes `share` of it."""
-
-    since_s: float
-    period_s: float
-    share: float
-
-    def missing(self, now_s: float) -> bool:
-        # a microsecond of slack: both times are whole steps, their difference is not quite
-        return (now_s - self.since_s + 1e-6) % self.period_s < self.share * self.period_s
-
-
-@dataclass(frozen=True, slots=True)
-class MotorDamage:
-    """`gain` multiplies the output; `held` keeps the output that the motor had at onset."""
-
-    off: bool = False
-    locked: bool = False
-    held: bool = False
-    gain: float = 1.0
-    gaps: Gaps | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class EscDamage:
-    """What is wrong with the telemetry of a speed controller, not with its motor."""
-
-    off: bool = False
-    gain: float = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class GpsDamage:
-    """`stuck_mask` has bits N, E, D, and 8 for fixes repeated to the digit. Vectors are NED.
-
-    `offset_m` jumps; `glitch_mps` moves position and velocity alike, `drift_mps` position alone.
-    """
-
-    off: bool = False
-    stuck_mask: int = 0
-    offset_m: Vector = ZERO
-    glitch_mps: Vector = ZERO
-    glitch_since_s: float = 0.0
-    drift_mps: Vector = ZERO
-    drift_since_s: float = 0.0
-    noise_m: float = 0.0
-    lag_s: float = 0.0
-    gaps: Gaps | None = None
-
-    def silent(self, now_s: float) -> bool:
-        return self.off or (self.gaps is not None and self.gaps.missing(now_s))
-
-
-@dataclass(frozen=True, slots=True)
-class ImuDamage:
-    """Bias (body axes) and standard deviation of extra white noise, in units of the sensor."""
-
-    bias: Vector = ZERO
-    noise: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Damage:
-    """All faults in effect."""
-
-    motors: tuple[MotorDamage, ...]
-    escs: tuple[EscDamage, ...]
-    gps: GpsDamage = field(default_factory=GpsDamage)
-    gyro: ImuDamage = field(default_factory=ImuDamage)
-    accel: ImuDamage = field(default_factory=ImuDamage)
-
-    @classmethod
-    def none(cls, airframe: Airframe) -> "Damage":
-        count = len(airframe.motors)
-        return cls((MotorDamage(),) * count, (EscDamage(),) * count)
 
 
 def inject(
@@ -98,14 +35,46 @@ def inject(
 ) -> Damage | None:
     """The damage after one MAV_CMD_INJECT_FAILURE, or None when it can't be put in effect.
 
-    `instance` counts from 1; 0 is all. `sizes` are the SIM_ parameters as they stand; a fault
-    whose size makes it no fault can't be put in effect.
+    `instance` counts from 1; 0 is all. `sizes` are the SIM_ parameters as they stand (each of
+    `default_sizes`); a fault whose size makes it no fault can't be put in effect.
     """
     count = len(damage.motors)
     healthy = Damage((MotorDamage(),) * count, (EscDamage(),) * count)
     if kind != FailureType.OK and _after(healthy, unit, kind, instance, sizes, now_s) == healthy:
         return None
-    return _after(damage, unit, kind, instance, sizes, now_s)
+    after = _after(damage, unit, kind, instance, sizes, now_s)
+    if after is None or kind == FailureType.OK or not sizes[ANNOUNCE]:
+        return after
+    return _announced(after, Unit(unit), instance)
+
+
+def struck(damage: Damage, injection: Injection, now_s: float) -> Damage | None:
+    """The damage after a whole injection; None when a part of it can't be put in effect."""
+    sizes = default_sizes() | dict(injection.parameters)
+    after: Damage | None = damage
+    for unit, kind, instance in injection.commands:
+        after = after and inject(after, unit, kind, instance, sizes, now_s)
+    return after
+
+
+def _announced(damage: Damage, unit: Unit, instance: int) -> Damage:
+    def chosen(i: int) -> bool:
+        return instance in (0, i + 1)
+
+    motors, escs = damage.motors, damage.escs
+    match unit:
+        case Unit.MOTOR:
+            told = (replace(m, announced=m.announced or chosen(i)) for i, m in enumerate(motors))
+            return replace(damage, motors=tuple(told))
+        case Unit.ESC:
+            said = (replace(e, announced=e.announced or chosen(i)) for i, e in enumerate(escs))
+            return replace(damage, escs=tuple(said))
+        case Unit.GPS:
+            return replace(damage, gps=replace(damage.gps, announced=True))
+        case Unit.GYRO:
+            return replace(damage, gyro=replace(damage.gyro, announced=True))
+        case Unit.ACCEL:
+            return replace(damage, accel=replace(damage.accel, announced=True))
 
 
 def _after(
@@ -204,34 +173,3 @@ def _vector(sizes: Sizes, prefix: str, axes: str) -> Vector:
 def _gaps(sizes: Sizes, prefix: str, now_s: float) -> Gaps | None:
     share = sizes[f"{prefix}_GAP"]
     return Gaps(now_s, sizes[f"{prefix}_CYCLE"], share) if share > 0.0 else None
-
-
-class MotorOutputs:
-    """Between autopilot and motors: what the motors get of what was commanded, and reported."""
-
-    def __init__(self, airframe: Airframe) -> None:
-        self._airframe = airframe
-        self._last: tuple[int, ...] = (PWM_OFF_US,) * len(airframe.motors)
-        self._held: dict[int, int] = {}
-
-    def broken(
-        self, motors: Sequence[MotorDamage], pwm_us: tuple[int, ...], now_s: float
-    ) -> tuple[int, ...]:
-        """PWM (us) for the physics; channels beyond the motors pass."""
-        out = tuple(self._one(i, m, pwm_us[i], now_s) for i, m in enumerate(motors))
-        self._last = out
-        return (*out, *pwm_us[len(out) :])
-
-    def _one(self, i: int, motor: MotorDamage, pwm_us: int, now_s: float) -> int:
-        if motor.held:
-            pwm_us = self._held.setdefault(i, self._last[i])
-        else:
-            self._held.pop(i, None)
-        if motor.locked:
-            return PWM_LOCKED_US
-        if motor.off or (motor.gaps is not None and motor.gaps.missing(now_s)):
-            return PWM_OFF_US
-        if motor.gain == 1.0 or pwm_us == PWM_OFF_US:
-            return pwm_us
-        zero_us = self._airframe.motors[i].zero_us
-        return clip_pwm(round(zero_us + motor.gain * (pwm_us - zero_us)))
