@@ -32,7 +32,8 @@ class Target:
 
     Yaw is a heading in NED (rad), yaw rate in rad/s; None leaves the heading alone. A point may
     come with a speed not to exceed. What flies also climbs at `down_mps`, or goes to the height
-    `down_m` (both NED down), and may be told to leave the ground or to come down to it.
+    `down_m` (both NED down), and may be told to leave the ground or to come down to it. `then` is
+    what came while it was leaving the ground: it waits until the height is reached.
     """
 
     time_s: float
@@ -45,6 +46,7 @@ class Target:
     down_m: float | None = None
     lifts: bool = False
     lands: bool = False
+    then: "Target | None" = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +66,17 @@ class Autopilot:
 
 @dataclass(frozen=True, slots=True)
 class Readiness:
-    """What transitions depend on: a position estimate, a mission, and complaints against arming."""
+    """What transitions depend on: a position estimate, a mission, and complaints against arming.
+
+    What flies has two more: it stands on the ground and its mission does not begin with a take-off
+    (`grounded`), and the throttle stick is not at the bottom (`throttle_up`).
+    """
 
     position: bool
     mission: bool = False
     complaints: tuple[str, ...] = ()
+    grounded: bool = False
+    throttle_up: bool = False
 
     @property
     def to_arm(self) -> bool:
@@ -88,13 +96,24 @@ def arm(state: Autopilot, ready: Readiness) -> Transition:
     """Arm if nothing speaks against it; otherwise every reason is told."""
     if state.armed:
         return Transition(state)
-    if not ready.to_arm:
-        waiting = () if ready.position else ("waiting for position estimate",)
-        reasons = (*waiting, *ready.complaints)
+    reasons = _against_arming(state, ready)
+    if reasons:
         texts = tuple(StatusText(Severity.CRITICAL, f"Arm: {reason}") for reason in reasons)
         return Transition(state, Result.FAILED, texts)
     text = StatusText(Severity.INFO, "Throttle armed")
     return Transition(replace(state, armed=True, target=None), Result.ACCEPTED, (text,))
+
+
+def _against_arming(state: Autopilot, ready: Readiness) -> tuple[str, ...]:
+    waiting = () if ready.position else ("waiting for position estimate",)
+    grounded = ready.grounded and state.mode is RoverMode.AUTO
+    high = ready.throttle_up and state.mode is RoverMode.MANUAL
+    return (
+        *waiting,
+        *ready.complaints,
+        *(("Missing Takeoff Cmd",) if grounded else ()),
+        *(("Throttle too high",) if high else ()),
+    )
 
 
 def disarm(state: Autopilot) -> Transition:
@@ -119,6 +138,8 @@ def set_mode(state: Autopilot, number: int, ready: Readiness) -> Transition:
         return _refused(state, f"Mode {mode.name}: waiting for position estimate", Result.FAILED)
     if mode is RoverMode.AUTO and not ready.mission:
         return _refused(state, "Mode AUTO: no mission", Result.FAILED)
+    if mode is RoverMode.AUTO and state.armed and ready.grounded:
+        return _refused(state, "Auto: Missing Takeoff Cmd", Result.FAILED)
     return Transition(replace(state, mode=mode, target=None))
 
 
@@ -127,16 +148,37 @@ def _refused(state: Autopilot, reason: str, result: Result) -> Transition:
 
 
 def accept_target(state: Autopilot, target: Target) -> Autopilot:
-    """Follow a new target; outside GUIDED it is dropped without a word, as ArduPilot does."""
-    return replace(state, target=target) if state.mode is RoverMode.GUIDED else state
+    """Follow a new target; outside GUIDED it is dropped without a word, as ArduPilot does.
+
+    A take-off is brought to its end first, so that a set-point can't stop a climb at half height;
+    in ArduPilot Copter it would. The newest one waits.
+    """
+    if state.mode is not RoverMode.GUIDED:
+        return state
+    if state.target is not None and state.target.lifts and not target.lifts:
+        return replace(state, target=replace(state.target, then=target))
+    return replace(state, target=target)
+
+
+def end_climb(state: Autopilot, now_s: float) -> Autopilot:
+    """The height of a take-off is reached: follow what has waited, unless it is stale, or hover."""
+    if state.mode is not RoverMode.GUIDED or state.target is None or not state.target.lifts:
+        return state
+    hover = replace(state.target, lifts=False, then=None)
+    waited = replace(state, target=state.target.then or hover)
+    return replace(state, target=hover) if _is_stale(waited.target, now_s) else waited
+
+
+def _is_stale(target: Target | None, now_s: float) -> bool:
+    """A velocity that nobody has repeated for 3 s. A position stays."""
+    if target is None or target.position_m is not None:
+        return False
+    return now_s - target.time_s > TARGET_TIMEOUT_S
 
 
 def check_target(state: Autopilot, now_s: float) -> Transition:
     """Forget a velocity that nobody has repeated for 3 s. A position stays."""
-    target = state.target
-    if target is None or target.position_m is not None:
-        return Transition(state)
-    if now_s - target.time_s <= TARGET_TIMEOUT_S:
+    if not _is_stale(state.target, now_s):
         return Transition(state)
     text = StatusText(Severity.WARNING, "target not received last 3secs, stopping")
     return Transition(replace(state, target=None), texts=(text,) if state.armed else ())
@@ -167,11 +209,11 @@ def check(
     return Transition(state, texts=(text,))
 
 
-def check_sticks(state: Autopilot, released: bool) -> Transition:
-    """HOLD when whoever drove in MANUAL has let go."""
+def check_sticks(state: Autopilot, released: bool, flies: bool = False) -> Transition:
+    """HOLD when whoever drove in MANUAL has let go. What flies lands."""
     if not released or not state.armed or state.mode is not RoverMode.MANUAL:
         return Transition(state)
-    text = StatusText(Severity.WARNING, "Radio Failsafe: Hold")
+    text = StatusText(Severity.WARNING, f"Radio Failsafe: {'Land' if flies else 'Hold'}")
     return Transition(replace(state, mode=RoverMode.HOLD, target=None), texts=(text,))
 
 

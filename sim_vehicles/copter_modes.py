@@ -3,6 +3,7 @@
 from hil.mavlink import CopterMode, RoverMode
 
 _NUMBERS = {
+    RoverMode.MANUAL: CopterMode.STABILIZE,
     RoverMode.HOLD: CopterMode.LOITER,
     RoverMode.GUIDED: CopterMode.GUIDED,
     RoverMode.AUTO: CopterMode.AUTO,
@@ -13,7 +14,7 @@ _MODES = {number: mode for mode, number in _NUMBERS.items()}
 
 def copter_number(mode: RoverMode, landing: bool) -> int:
     """The custom_mode of a heartbeat."""
-    return CopterMode.LAND if landing else _NUMBERS.get(mode, CopterMode.STABILIZE)
+    return CopterMode.LAND if landing else _NUMBERS[mode]
 
 
 def mode_of(number: int) -> RoverMode | None:

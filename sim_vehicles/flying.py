@@ -81,7 +81,7 @@ def fly_at(
     wish, memory = _wish(frame, flight, memory, estimate, (north, east, down), dt_s)
     resting = down >= 0.2 and abs(estimate.velocity_mps[2]) < 0.1
     memory = replace(memory, resting_s=memory.resting_s + dt_s if resting else 0.0)
-    return mix_rotors(frame, wish.thrust, *_turns(drive, flight, memory, estimate, wish)), memory
+    return mix_rotors(frame, wish.thrust, *turns(drive, flight, memory, estimate, wish)), memory
 
 
 def _sinking(
@@ -119,7 +119,7 @@ def _wish(
     return Wish(*tilt, max(IDLE_SHARE, min(1.0, share))), memory
 
 
-def _turns(
+def turns(
     drive: Drive, flight: Flight, memory: Memory, estimate: Estimate, wish: Wish
 ) -> tuple[float, float, float]:
     """Roll, pitch and yaw moments as shares of the maximum thrust of a rotor."""

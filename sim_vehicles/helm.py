@@ -21,14 +21,16 @@ from sim_vehicles.autopilot import (
     check_sticks,
     check_target,
     disarm,
+    end_climb,
     set_mode,
 )
+from sim_vehicles.by_hand import BOTTOM, fly_by_hand
 from sim_vehicles.control import Drive, Memory, velocity_towards
 from sim_vehicles.copter_modes import mode_of
 from sim_vehicles.estimator import Estimate
 from sim_vehicles.failsafes import Trip
 from sim_vehicles.flying import climb_to, has_landed, land, landing_speed, settle, take_off
-from sim_vehicles.mission import Air, Surroundings
+from sim_vehicles.mission import HEIGHT_REACHED_M, Air, Surroundings
 from sim_vehicles.navigator import Navigator
 from sim_vehicles.parameters import Parameters
 from sim_vehicles.senses import Senses
@@ -66,7 +68,11 @@ class Helm:
 
     @property
     def ready(self) -> Readiness:
-        return self._readiness(self.autopilot.mode)
+        ready = self._readiness(self.autopilot.mode)
+        if not self._navigator.flies or self._memory.airborne:
+            return ready
+        throttle_up = self._piloting.sticks.throttle > BOTTOM
+        return replace(ready, grounded=not self._navigator.takes_off, throttle_up=throttle_up)
 
     def apply(self, change: Change) -> Result:
         """Put a transition into effect; its texts go to every station."""
@@ -74,7 +80,9 @@ class Helm:
         before, self.autopilot = self.autopilot, transition.state
         if (before.mode, before.armed) != (self.autopilot.mode, self.autopilot.armed):
             self._memory = self._memory.afresh(self._senses.estimate().yaw_rad)
-            self._piloting.centre()
+            self._piloting.centre(self._now_s if self._hovers else None)
+        if before.armed and not self.autopilot.armed and self._navigator.flies:
+            self._navigator.rewind()
         self._tell(transition.texts)
         return transition.result
 
@@ -92,13 +100,13 @@ class Helm:
         return result
 
     def take_off(self, height_m: float) -> Result:
-        """In GUIDED, armed: rise to a height above home, here."""
+        """In GUIDED, armed, on the ground: rise to a height above home, here."""
         guided = self.autopilot.armed and self.autopilot.mode is RoverMode.GUIDED
-        if not guided or self._senses.home_m is None:
+        if not guided or self._memory.airborne or self._senses.home_m is None:
             return Result.FAILED
         north, east, _ = self._senses.estimate().position_m
         down_m = self._senses.home_down_m - height_m
-        point = Target(self._now_s, position_m=(north, east), down_m=down_m)
+        point = Target(self._now_s, position_m=(north, east), down_m=down_m, lifts=True)
         self._memory = take_off(self._memory)
         self.autopilot = accept_target(self.autopilot, point)
         return Result.ACCEPTED
@@ -115,14 +123,20 @@ class Helm:
         self._now_s = now_s
         for trip in trips:
             self._check(trip)
-        released = self._piloting.sticks.are_released(now_s)
-        self.apply(lambda state, _ready: check_sticks(state, released))
+        self._check_sticks(now_s)
         self.apply(lambda state, _ready: check_target(state, now_s))
 
     def _check(self, trip: Trip) -> None:
         known, flies = self.autopilot.tripped, self._navigator.flies
         self.apply(lambda state, _ready: check(state, trip.which, trip.tripped, trip.action, flies))
         if self.autopilot.tripped - known and trip.action is RoverMode.HOLD and self._hovers:
+            self._memory = land(self._memory)
+
+    def _check_sticks(self, now_s: float) -> None:
+        by_hand, flies = self.autopilot.mode is RoverMode.MANUAL, self._navigator.flies
+        released = self._piloting.sticks.are_released(now_s)
+        self.apply(lambda state, _ready: check_sticks(state, released, flies))
+        if by_hand and self.autopilot.mode is RoverMode.HOLD and self._hovers:
             self._memory = land(self._memory)
 
     def navigate(self, around: Surroundings) -> None:
@@ -156,9 +170,9 @@ class Helm:
         if not (self.autopilot.drives or self._hovers):
             self._memory = settle(self._memory.afresh(estimate.yaw_rad))
             return (None,) * len(airframe.motors)
-        if self.autopilot.mode is RoverMode.MANUAL and not airframe.flight:
-            sticks = self._piloting.sticks
-            return mix(airframe, sticks.throttle, sticks.lateral, sticks.steering)
+        if self.autopilot.mode is RoverMode.MANUAL:
+            return self._by_hand(estimate, dt_s)
+        self._end_climb(estimate)
         velocity = self._aim(estimate, dt_s)
         outputs, self._memory = steer(self._drive, self._memory, estimate, velocity, dt_s)
         if self._lands and has_landed(self._memory):
@@ -166,6 +180,20 @@ class Helm:
             if self.autopilot.mode is not RoverMode.AUTO:  # a mission may go on
                 self.apply(lambda state, _ready: disarm(state))
         return outputs
+
+    def _by_hand(self, estimate: Estimate, dt_s: float) -> Outputs:
+        airframe, sticks = self._drive.airframe, self._piloting.sticks
+        if airframe.flight is None:
+            return mix(airframe, sticks.throttle, sticks.lateral, sticks.steering)
+        outputs, self._memory = fly_by_hand(self._drive, self._memory, estimate, sticks, dt_s)
+        return outputs
+
+    def _end_climb(self, estimate: Estimate) -> None:
+        target = self.autopilot.target
+        if target is None or not target.lifts or target.down_m is None:
+            return
+        if abs(target.down_m - estimate.position_m[2]) <= HEIGHT_REACHED_M:
+            self.autopilot = end_climb(self.autopilot, self._now_s)
 
     @property
     def _hovers(self) -> bool:

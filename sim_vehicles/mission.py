@@ -36,6 +36,7 @@ _WITHOUT_PLACE = frozenset(
         Command.NAV_TAKEOFF,  # straight up, as ArduPilot does
     }
 )
+_WITHOUT_MOTION = frozenset({Command.NAV_DELAY, Command.DO_CHANGE_SPEED})
 _WITH_HEIGHT = frozenset({Command.NAV_WAYPOINT, Command.NAV_LOITER_UNLIM, Command.NAV_TAKEOFF})
 _TO_THE_GROUND = frozenset({Command.NAV_LAND, Command.NAV_RETURN_TO_LAUNCH})
 _ABOVE_SEA = frozenset({GlobalFrame.GLOBAL, GlobalFrame.GLOBAL_INT})
@@ -165,6 +166,12 @@ def _is_done(item: MissionItem, progress: Progress, around: Surroundings) -> boo
     waits = item.command in (Command.NAV_WAYPOINT, Command.NAV_DELAY)
     hold_s = max(0.0, item.params[0]) if waits else 0.0
     return around.now_s - progress.arrived_s >= hold_s - 1e-6
+
+
+def begins_with_take_off(items: Sequence[MissionItem]) -> bool:
+    """Whether a take-off comes before whatever else moves the vehicle."""
+    moving = (i.command for i in items if i.command not in _WITHOUT_MOTION)
+    return next(moving, None) == Command.NAV_TAKEOFF
 
 
 def state_of(count: int, progress: Progress, running: bool) -> MissionState:

@@ -27,6 +27,7 @@ from sim_vehicles.mission import (
     Progress,
     Surroundings,
     advance,
+    begins_with_take_off,
     state_of,
 )
 
@@ -86,6 +87,17 @@ class Navigator:
     @property
     def has_zones(self) -> bool:
         return bool(self._zones)
+
+    @property
+    def takes_off(self) -> bool:
+        """Whether the next item that needs the air is a take-off."""
+        seq = 1 if self.progress.complete else self.progress.seq
+        return begins_with_take_off(self.lists[MissionType.MISSION][seq:])
+
+    def rewind(self) -> None:
+        """A mission that was left before its end starts again, as in ArduPilot after disarming."""
+        if not self.progress.complete:
+            self.progress = Progress()
 
     def store(self, kind: MissionType, items: Sequence[MissionItem]) -> MissionResult:
         """Take a whole list over; a mission starts again from its first item."""

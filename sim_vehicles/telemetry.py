@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 
-from hil.airframe import pwm_to_output
+from hil.airframe import Airframe, pwm_to_output
 from hil.frames import Origin, ned_to_wgs84
 from hil.mavlink import (
     AUTOPILOT_ARDUPILOT,
@@ -43,7 +43,7 @@ from hil.mavlink import (
     VfrHud,
 )
 from sim_vehicles.autopilot import Autopilot, system_status
-from sim_vehicles.battery import BatteryState
+from sim_vehicles.battery import BatteryState, loads
 from sim_vehicles.copter_modes import copter_number
 from sim_vehicles.estimator import Estimate
 from sim_vehicles.innovation import Innovation
@@ -104,9 +104,13 @@ class Snapshot:
     innovation: Innovation
     escs: EscTelemetry
     sticks: Sticks
-    flies: bool = False
+    airframe: Airframe
     landed: LandedState = LandedState.ON_GROUND
     unhealthy: Sensor = ALL_WELL
+
+    @property
+    def flies(self) -> bool:
+        return self.airframe.flight is not None
 
 
 def heartbeat(s: Snapshot) -> Heartbeat:
@@ -234,20 +238,21 @@ def esc_telemetry(s: Snapshot) -> EscTelemetry:
 
 def vfr_hud(s: Snapshot) -> VfrHud:
     vn, ve, vd = s.estimate.velocity_mps
-    outputs = [abs(pwm_to_output(pwm) or 0.0) for pwm in s.pwm_us if pwm]
-    throttle = sum(outputs) / max(1, len(outputs))
+    outputs = [pwm_to_output(pwm) for pwm in s.pwm_us[: len(s.airframe.motors)]]
+    throttle = sum(loads(s.airframe, outputs)) / len(outputs)
     alt_m = s.origin.alt_m - s.estimate.position_m[2]
     return VfrHud(math.hypot(vn, ve), alt_m, -vd, s.estimate.yaw_rad, throttle)
 
 
 def rc_channels(s: Snapshot) -> RcChannels | None:
-    """The sticks as channels 1 (steering), 3 (throttle), 4 (lateral); None before any moved."""
-    if s.sticks.moved_s == -math.inf:
+    """The sticks as channels 1 to 4, as `services/piloting.py` has them; None before any moved."""
+    sticks = s.sticks
+    if sticks.moved_s == -math.inf:
         return None
-    steering, throttle, lateral = (
-        round(1500 + 500 * v) for v in (s.sticks.steering, s.sticks.throttle, s.sticks.lateral)
-    )
-    return RcChannels(s.now_s, (steering, 1500, throttle, lateral))
+    axes = (sticks.steering, 0.0, sticks.throttle, sticks.lateral)
+    if s.flies:
+        axes = (sticks.lateral, -sticks.ahead, sticks.throttle, sticks.steering)
+    return RcChannels(s.now_s, tuple(round(1500 + 500 * axis) for axis in axes))
 
 
 def autopilot_version(s: Snapshot) -> AutopilotVersion:

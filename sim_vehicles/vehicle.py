@@ -62,7 +62,7 @@ class Vehicle:
         self._parameters = rover_parameters(sysid, scenario.links.station_sysid, member.frame)
         self._navigator = Navigator(self._origin, member.frame.flight is not None)
         self._guard = Guard(self._parameters, self._navigator, self._senses)
-        self._piloting = PilotingService()
+        self._piloting = PilotingService(member.frame.flight is not None)
         self._helm = Helm(
             self._drive,
             self._senses,
@@ -211,7 +211,7 @@ class Vehicle:
             innovation=self._senses.innovation,
             escs=esc_telemetry(airframe, pwm_seen_us, damage.escs, self._battery, now_s),
             sticks=self._piloting.sticks,
-            flies=airframe.flight is not None,
+            airframe=airframe,
             landed=self._helm.landed_state(),
             unhealthy=unhealthy(damage),
         )

@@ -18,6 +18,7 @@ from hil.mavlink import (
     Heartbeat,
     MessageId,
     Result,
+    StatusText,
 )
 
 REST: Velocity = (0.0, 0.0, 0.0)
@@ -172,8 +173,11 @@ def test_quad_modes_are_copters(quad: InWorld) -> None:
     assert asked(CopterMode.LOITER) == Result.ACCEPTED
     assert told() == CopterMode.LOITER
     assert quad.truth().down_m < -1.0
-    assert asked(CopterMode.STABILIZE) == Result.UNSUPPORTED
+    assert asked(CopterMode.STABILIZE) == Result.ACCEPTED
+    assert told() == CopterMode.STABILIZE
     assert asked(CopterMode.GUIDED) == Result.ACCEPTED
+    assert asked(7) == Result.UNSUPPORTED  # CIRCLE
+    assert "Mode 7 is not implemented" in [t.text for t in quad.sent(StatusText)]
 
 
 def test_take_off_and_landing_need_their_moment() -> None:

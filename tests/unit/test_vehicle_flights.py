@@ -6,6 +6,7 @@ from collections.abc import Callable
 import pytest
 from vehicle_world import InWorld, scenario
 
+from hil.airframe import QUAD_X
 from hil.frames import ned_to_wgs84
 from hil.mavlink import (
     Command,
@@ -16,6 +17,7 @@ from hil.mavlink import (
     GlobalSetpoint,
     Heartbeat,
     LocalSetpoint,
+    MessageId,
     MissionAck,
     MissionCount,
     MissionItem,
@@ -23,6 +25,7 @@ from hil.mavlink import (
     MissionResult,
     Result,
     StatusText,
+    VfrHud,
 )
 
 NAN = float("nan")
@@ -187,7 +190,111 @@ def test_silence_of_the_station_lands_it(quad: InWorld) -> None:
     assert CopterMode.LAND in {h.custom_mode for h in quad.sent(Heartbeat)}
 
 
-def test_stabilize_is_refused_with_a_reason(quad: InWorld) -> None:
-    asked = ordered(quad, Command.DO_SET_MODE, 1.0, float(CopterMode.STABILIZE))
-    assert asked == Result.UNSUPPORTED
-    assert [t.text for t in quad.sent(StatusText)] == ["Mode 0 is not implemented"]
+def goes_up(world: InWorld, height_m: float) -> None:
+    take_off = (Command.NAV_TAKEOFF, 0, 0, 0, NAN, 0, 0, height_m)
+    assert ordered(world, *take_off) == Result.ACCEPTED
+
+
+def highest(world: InWorld, seconds: float, velocity: tuple[float, float, float]) -> float:
+    """How high it gets while it is sent a velocity, if that does not end the climb."""
+    top_m = 0.0
+    for _ in range(round(seconds / 0.1)):
+        world.run(0.1, {1: velocity})
+        top_m = max(top_m, -world.truth().down_m)
+    return top_m
+
+
+def test_a_velocity_waits_until_the_take_off_is_done() -> None:
+    world = ready()
+    goes_up(world, 3.0)
+    world.run(0.5, {1: (1.0, 0.0, 0.0)})
+    world.run(1.5, {1: (1.0, 0.0, 0.0)})
+    assert abs(world.truth().north_mps) < 0.3
+    assert highest(world, 6.0, (1.0, 0.0, 0.0)) > 2.7
+    assert world.truth().north_mps == pytest.approx(1.0, abs=0.2)
+    assert -world.truth().down_m == pytest.approx(3.0, abs=0.5)
+
+
+def test_a_velocity_that_came_once_is_forgotten_when_the_climb_ends() -> None:
+    world = ready()
+    goes_up(world, 12.0)  # takes longer than a velocity lasts
+    world.run(0.5, {1: (1.0, 0.0, 0.0)})
+    world.run(12.0)
+    assert is_at(world, 0.0, 0.0, 12.0)
+    texts = [t.text for t in world.sent(StatusText)]
+    assert "target not received last 3secs, stopping" not in texts
+
+
+def test_a_point_waits_until_the_take_off_is_done() -> None:
+    world = ready()
+    goes_up(world, 3.0)
+    there = LocalSetpoint(1, 1, 0.0, 1, POSITION_ALONE, (2.0, 0.0, -1.0), None, None, None)
+    world.tell(world.station.encode(there))
+    assert highest(world, 5.0, (0.0, 0.0, 0.0)) > 2.5
+    world.tell(world.station.encode(there))
+    until(world, lambda: is_at(world, 2.0, 0.0, 1.0))
+
+
+def test_in_the_air_there_is_no_second_take_off(quad: InWorld) -> None:
+    assert ordered(quad, Command.NAV_TAKEOFF, 0, 0, 0, NAN, 0, 0, 6.0) == Result.FAILED
+    quad.run(3.0)
+    assert is_at(quad, 0.0, 0.0, 3.0)
+
+
+WITHOUT_TAKE_OFF = (RELATIVE, Command.NAV_WAYPOINT, (0, 0), 3.0)
+SPEED_FIRST = (RELATIVE, Command.DO_CHANGE_SPEED, (0, 0), 0.0)
+UP = (RELATIVE, Command.NAV_TAKEOFF, (0, 0), 2.0)
+
+
+def test_auto_on_the_ground_needs_a_take_off() -> None:
+    world = ready()
+    assert upload(world, WITHOUT_TAKE_OFF) == MissionResult.ACCEPTED
+    for command, *params in ((Command.DO_SET_MODE, 1.0, 3.0), (Command.MISSION_START,)):
+        assert ordered(world, command, *params) == Result.FAILED
+        assert [t.text for t in world.sent(StatusText)] == ["Auto: Missing Takeoff Cmd"]
+    world.run(2.0)
+    assert world.sent(Heartbeat)[-1].custom_mode == CopterMode.GUIDED
+    assert upload(world, SPEED_FIRST, UP) == MissionResult.ACCEPTED
+    assert ordered(world, Command.MISSION_START) == Result.ACCEPTED
+
+
+def test_arming_in_auto_needs_a_take_off() -> None:
+    world = InWorld(scenario("quad_x"))
+    world.run(1.5)
+    upload(world, WITHOUT_TAKE_OFF)
+    assert ordered(world, Command.DO_SET_MODE, 1.0, float(CopterMode.AUTO)) == Result.ACCEPTED
+    assert ordered(world, Command.COMPONENT_ARM_DISARM, 1.0) == Result.FAILED
+    assert [t.text for t in world.sent(StatusText)] == ["Arm: Missing Takeoff Cmd"]
+    upload(world, UP)
+    assert ordered(world, Command.COMPONENT_ARM_DISARM, 1.0) == Result.ACCEPTED
+
+
+def test_in_the_air_a_mission_needs_no_take_off(quad: InWorld) -> None:
+    upload(quad, (RELATIVE, Command.NAV_WAYPOINT, on_globe(quad, 2.0, 0.0), 4.0))
+    assert ordered(quad, Command.MISSION_START) == Result.ACCEPTED
+    until(quad, lambda: is_at(quad, 2.0, 0.0, 4.0))
+
+
+def test_a_mission_left_half_way_starts_again_after_disarming(quad: InWorld) -> None:
+    upload(quad, UP, (RELATIVE, Command.NAV_WAYPOINT, on_globe(quad, 2.0, 0.0), 4.0))
+    assert ordered(quad, Command.MISSION_START) == Result.ACCEPTED
+    quad.run(0.5)
+    assert ordered(quad, Command.NAV_LAND) == Result.ACCEPTED
+    until(quad, lambda: is_down(quad))
+    assert ordered(quad, Command.COMPONENT_ARM_DISARM, 1.0) == Result.ACCEPTED
+    assert ordered(quad, Command.MISSION_START) == Result.ACCEPTED
+    until(quad, lambda: is_at(quad, 2.0, 0.0, 4.0))
+
+
+def test_the_throttle_that_is_told_is_that_of_the_rotors(quad: InWorld) -> None:
+    """Hovering: m g over the maximum thrust, through the bent thrust curve."""
+    quad.run(3.0)
+    quad.tell(quad.station.request_message(1, MessageId.VFR_HUD))
+    assert QUAD_X.flight is not None
+    e, share = QUAD_X.flight.thrust_expo, QUAD_X.weight_n / (4 * QUAD_X.motors[0].stall_force_n)
+    u = quad.sent(VfrHud)[-1].throttle
+    assert (1.0 - e) * u + e * u * u == pytest.approx(share, abs=0.02)
+    ordered(quad, Command.COMPONENT_ARM_DISARM, 0.0)
+    quad.run(0.1)
+    quad.tell(quad.station.request_message(1, MessageId.VFR_HUD))
+    assert quad.sent(VfrHud)[-1].throttle == 0.0
