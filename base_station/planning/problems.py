@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.planning.alpha import AlphaProblem
-from base_station.planning.beta import BetaProblem
-from base_station.planning.objectives import Information, Objective, PaperDistance
 from base_station.planning.policy import Commands
 from base_station.planning.requests import PlanRequest
+from base_station.planning.tasks.alpha import AlphaProblem
+from base_station.planning.tasks.beta import BetaProblem
+from base_station.planning.tasks.objectives import Information, Objective, PaperDistance
 from base_station.twin import YAW, FaultArrays, FleetModel, fault_rows
 from hil.scenario import StationView
 

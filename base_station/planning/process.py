@@ -15,12 +15,14 @@ from typing import TextIO
 import numpy as np
 
 from base_station.hypotheses import candidates
-from base_station.planning import ppo
-from base_station.planning.alpha import AlphaTask
-from base_station.planning.candidates import best_candidate
+from base_station.planning.learning import ppo
+from base_station.planning.learning.lesson import Lesson
+from base_station.planning.learning.presets import TUNED_ALPHA
 from base_station.planning.planner import plan
 from base_station.planning.problems import alpha_problem
 from base_station.planning.requests import PlanRequest, decode, encode
+from base_station.planning.tasks.alpha import AlphaTask
+from base_station.planning.tasks.candidates import best_candidate
 from base_station.twin import FleetModel, initial_state
 from hil.errors import InputError
 from hil.scenario import StationView, load_station_view
@@ -70,10 +72,10 @@ def warm_up(view: StationView) -> None:
         delivered=(False,) * len(view.fleet),
     )
     problem = alpha_problem(view, request)
-    preset = replace(ppo.TUNED_ALPHA, environments=4, batch_size=128, epochs=1, total_timesteps=128)
+    preset = replace(TUNED_ALPHA, environments=4, batch_size=128, epochs=1, total_timesteps=128)
     task = AlphaTask(problem, preset.environments, np.random.default_rng(0))
-    learned = ppo.train(task, preset, 0, lambda *_: False, lambda *_: None)
-    best_candidate(problem, learned.weights, learned.log_std, 0)
+    learned = ppo.train(Lesson(task, preset, 0, lambda _: False, lambda *_: None))
+    best_candidate(problem, learned.actor, 0)
 
 
 def apart(view: StationView, start: np.ndarray) -> np.ndarray:

@@ -28,9 +28,13 @@ class Diagnosis(Model):
 
 
 class Planning(Model):
-    """`planner` finds the experiment; the mission is always learned."""
+    """`planner` finds the experiment; the mission is always learned. `exploration` is how qtable
+    and dqn choose commands."""
 
-    planner: Literal["ppo", "cem", "shooting", "random", "gradient", "ram"] = "ppo"
+    planner: Literal[
+        "ppo", "ppo_lstm", "qtable", "dqn", "cem", "shooting", "random", "gradient", "ram"
+    ] = "ppo"
+    exploration: Literal["greedy", "epsilon", "boltzmann"] = "epsilon"
     objective: Literal["paper_distance", "paper_printed", "information"] = "paper_distance"
     preset: Literal["tuned", "paper"] = "tuned"
     suspect: Literal["held", "commanded"] = "held"

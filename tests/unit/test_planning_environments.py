@@ -7,10 +7,10 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from planning_scenes import asked, experiment, planning
 
-from base_station.planning.alpha import AlphaTask
-from base_station.planning.beta import BetaTask
-from base_station.planning.environments import AlphaEnv, BetaEnv
 from base_station.planning.problems import alpha_problem, beta_problem
+from base_station.planning.tasks.alpha import AlphaTask
+from base_station.planning.tasks.beta import BetaTask
+from base_station.planning.tasks.environments import AlphaEnv, BetaEnv
 
 TERMS = {
     "paper_distance": {"distance", "wall"},

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from base_station.hypotheses import candidates
-from base_station.planning.evaluation import (
+from base_station.planning.tasks.evaluation import (
     INVALID,
     MODEL_ERROR,
     REPORT_SIGMA_M,

@@ -7,16 +7,20 @@ import numpy as np
 import pytest
 
 from base_station.hypotheses import candidates, nominal
-from base_station.planning import planner
-from base_station.planning.alpha import AlphaTask
-from base_station.planning.beta import BetaTask, nominal_starts, success_share
-from base_station.planning.candidates import best_candidate
-from base_station.planning.objectives import rho_alpha
-from base_station.planning.planner import derived_seed, plan
+from base_station.planning.actors import Gaussian
+from base_station.planning.attempts import derived_seed
+from base_station.planning.learning.lesson import Lesson
+from base_station.planning.learning.ppo import train
+from base_station.planning.learning.presets import PRESETS, TUNED_ALPHA
+from base_station.planning.learning.vec_env import TaskVecEnv
+from base_station.planning.planner import plan
 from base_station.planning.policy import Commands, act, arrived, to_setpoints
-from base_station.planning.ppo import TUNED_ALPHA, TaskVecEnv, train
 from base_station.planning.problems import alpha_problem, beta_problem, blocked_directions
 from base_station.planning.requests import PlanRequest, PolicyWeights, encode
+from base_station.planning.tasks.alpha import AlphaTask
+from base_station.planning.tasks.beta import BetaTask, nominal_starts, success_share
+from base_station.planning.tasks.candidates import best_candidate
+from base_station.planning.tasks.objectives import rho_alpha
 from base_station.twin import (
     EAST,
     NORTH,
@@ -173,14 +177,14 @@ def test_learning_repeats_to_the_bit_and_beats_random_play(rescue_view):
     assert found.predicted_reports.shape == (2, 17, 3, 2)
     problem = alpha_problem(rescue_view, asked)
     untrained = AlphaTask(problem, 1, np.random.default_rng(0))
-    lazy = best_candidate(problem, zero_policy(untrained), np.full(4, -9.0), 0)
+    lazy = best_candidate(problem, Gaussian(zero_policy(untrained), np.full(4, -9.0)), 0)
     assert found.predicted_error < 0.1 * lazy.error
 
 
 def test_restarts_differ_and_a_missed_target_ends_without_a_plan(rescue_view, monkeypatch):
     assert len({derived_seed(7, k) for k in range(20)}) == 20
     short = replace(TUNED_ALPHA, environments=4, batch_size=128, total_timesteps=128)
-    monkeypatch.setitem(planner.PRESETS, ("tuned", "alpha"), short)
+    monkeypatch.setitem(PRESETS, ("tuned", "alpha"), short)
     view = rescue_view.model_copy(
         update={
             "diagnosis": rescue_view.diagnosis.model_copy(update={"plan_error": 1e-300}),
@@ -226,6 +230,6 @@ def test_an_early_end_of_training_is_the_targets(rescue_view):
     small = replace(
         TUNED_ALPHA, environments=4, batch_size=128, check_every=1, total_timesteps=10_000
     )
-    learned = train(task, small, 0, lambda *_: True, lambda *_: None)
+    learned = train(Lesson(task, small, 0, lambda _: True, lambda *_: None))
     assert learned.accepted
     assert learned.timesteps <= 2 * 4 * small.steps

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from planning_scenes import experiment, planning
 
-from base_station.planning.alpha import nominal_returns
-from base_station.planning.evaluation import separation
-from base_station.planning.objectives import GAIN, Information, PaperDistance, known_share
 from base_station.planning.planner import plan
 from base_station.planning.problems import alpha_problem, objective_of
-from base_station.planning.shooting import shooting
+from base_station.planning.searches.shooting import shooting
+from base_station.planning.tasks.alpha import nominal_returns
+from base_station.planning.tasks.evaluation import separation
+from base_station.planning.tasks.objectives import GAIN, Information, PaperDistance, known_share
 from base_station.twin import EAST
 
 EVEN = (0.5, 0.5)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from planning_scenes import asked
 
-from base_station.planning.beta import brought_home
 from base_station.planning.problems import beta_problem
-from base_station.planning.push import push
+from base_station.planning.scripted.push import push
+from base_station.planning.tasks.beta import brought_home
 from base_station.twin import initial_state
 
 

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from planning_scenes import experiment, planning
 
-from base_station.planning import planner
-from base_station.planning.alpha import nominal_returns
-from base_station.planning.around import get_behind
-from base_station.planning.cem import cem
-from base_station.planning.gradient import gradient
-from base_station.planning.planner import SEARCHES, plan
-from base_station.planning.ppo import TUNED_ALPHA
+from base_station.planning.learning.presets import PRESETS, TUNED_ALPHA
+from base_station.planning.planner import plan
 from base_station.planning.problems import alpha_problem
-from base_station.planning.ram import ram
 from base_station.planning.requests import encode
-from base_station.planning.search import LOOK_EVERY, ROUND, search
-from base_station.planning.shooting import shooting, stretched
-from base_station.planning.stepwise import stepwise
+from base_station.planning.scripted.around import get_behind
+from base_station.planning.scripted.ram import ram
+from base_station.planning.searches.cem import cem
+from base_station.planning.searches.gradient import gradient
+from base_station.planning.searches.search import LOOK_EVERY, ROUND, search
+from base_station.planning.searches.shooting import shooting, stretched
+from base_station.planning.searches.stepwise import stepwise
+from base_station.planning.tasks.alpha import nominal_returns
+from base_station.planning.trying import SEARCHES
 from base_station.twin import NORTH, initial_state
 
 
@@ -43,7 +43,7 @@ def test_an_experiment_is_found_and_named(rescue_view, name):
 @pytest.mark.parametrize("name", sorted(SEARCHES))
 def test_the_same_request_gets_the_same_answer(rescue_view, name, monkeypatch):
     short = replace(TUNED_ALPHA, total_timesteps=LOOK_EVERY * ROUND * 16)
-    monkeypatch.setitem(planner.PRESETS, ("tuned", "alpha"), short)
+    monkeypatch.setitem(PRESETS, ("tuned", "alpha"), short)
     plans = [answered(rescue_view, name, experiment(rescue_view)).plan for _ in range(2)]
     if plans[0] is None:
         assert plans[1] is None
@@ -53,7 +53,7 @@ def test_the_same_request_gets_the_same_answer(rescue_view, name, monkeypatch):
 
 def test_a_missed_target_is_tried_again_with_another_seed(rescue_view, monkeypatch):
     short = replace(TUNED_ALPHA, total_timesteps=2 * ROUND * 16)
-    monkeypatch.setitem(planner.PRESETS, ("tuned", "alpha"), short)
+    monkeypatch.setitem(PRESETS, ("tuned", "alpha"), short)
     strict = rescue_view.diagnosis.model_copy(update={"plan_error": 1e-300})
     view = planning(rescue_view.model_copy(update={"diagnosis": strict}), planner="cem", restarts=1)
     answer = plan(view, experiment(view), lambda _: None)

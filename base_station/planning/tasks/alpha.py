@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.planning.objectives import Moment, Objective, Terms
-from base_station.planning.policy import Commands, act, to_setpoints
-from base_station.planning.requests import PolicyWeights
-from base_station.planning.starts import scattered
-from base_station.planning.tasks import Step
+from base_station.planning.actors import Actor
+from base_station.planning.policy import Commands, to_setpoints
+from base_station.planning.tasks.objectives import Moment, Objective, Terms
+from base_station.planning.tasks.starts import scattered
+from base_station.planning.tasks.task import Step
 from base_station.twin import (
     EAST,
     HELD_EAST,
@@ -106,17 +106,18 @@ class AlphaProblem:
         return np.concatenate([block.reshape(len(states), -1) for block in blocks], axis=1)
 
 
-def nominal_actions(problem: AlphaProblem, weights: PolicyWeights) -> Array:
-    """The deterministic policy played on the nominal twin: actions [K, A]."""
-    states = problem.start[None].copy()
+def played(problem: AlphaProblem, actor: Actor, count: int, rng: np.random.Generator) -> Array:
+    """`count` episodes on the nominal twin, [C, K, A]: the actor's mode first, then samples."""
+    states = np.repeat(problem.start[None], count, axis=0)
     memory = problem.objective.begin(problem.reports(states))
-    actions = []
+    actions = np.empty((count, problem.steps, problem.commands.size))
+    actor.begin(count)
     for k in range(problem.steps):
-        action = act(weights, problem.observe(states, memory, np.array([k])))
-        setpoints = to_setpoints(action, problem.commands)
+        seen = problem.observe(states, memory, np.full(count, k))
+        actions[:, k] = actor.act(seen, rng)
+        setpoints = to_setpoints(actions[:, k], problem.commands)
         problem.move(problem.model.nominal, states, memory, setpoints)
-        actions.append(action[0])
-    return np.array(actions)
+    return actions
 
 
 def nominal_returns(problem: AlphaProblem, actions: Array) -> Array:

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.planning.evaluation import pair_squares
+from base_station.planning.tasks.evaluation import pair_squares
 from base_station.twin import V_EAST, V_NORTH, FleetModel
 
 Array = NDArray[np.float64]

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.planning.alpha import AlphaProblem, nominal_actions
-from base_station.planning.evaluation import plan_errors, predict
+from base_station.planning.actors import Actor
 from base_station.planning.policy import to_setpoints
-from base_station.planning.requests import OpenLoopPlan, PolicyWeights
+from base_station.planning.requests import OpenLoopPlan
+from base_station.planning.tasks.alpha import AlphaProblem, played
+from base_station.planning.tasks.evaluation import plan_errors, predict
 
 Array = NDArray[np.float64]
 
@@ -31,14 +32,10 @@ def better(one: Candidate, other: Candidate) -> Candidate:
     return min(one, other, key=lambda c: c.error)
 
 
-def best_candidate(
-    problem: AlphaProblem, weights: PolicyWeights, log_std: Array, seed: int
-) -> Candidate:
+def best_candidate(problem: AlphaProblem, actor: Actor, seed: int) -> Candidate:
     """The best at the declared percentile among the policy's mode and samples of it."""
     rng = np.random.default_rng([seed, 1])
-    mode = nominal_actions(problem, weights)
-    noise = rng.standard_normal((CANDIDATES - 1, *mode.shape)) * np.exp(log_std)
-    return best_of(problem, np.concatenate([mode[None], mode + noise]), rng)
+    return best_of(problem, played(problem, actor, CANDIDATES, rng), rng)
 
 
 def best_of(problem: AlphaProblem, actions: Array, rng: np.random.Generator) -> Candidate:

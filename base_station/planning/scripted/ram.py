@@ -5,10 +5,10 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.planning.alpha import AlphaProblem
-from base_station.planning.around import get_behind
 from base_station.planning.policy import to_setpoints
-from base_station.planning.search import Proposals
+from base_station.planning.scripted.around import get_behind
+from base_station.planning.searches.search import Proposals
+from base_station.planning.tasks.alpha import AlphaProblem
 from base_station.twin import EAST, NORTH
 
 Array = NDArray[np.float64]

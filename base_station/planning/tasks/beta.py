@@ -20,8 +20,8 @@ from base_station.planning.policy import (
     to_setpoints,
 )
 from base_station.planning.requests import PolicyWeights
-from base_station.planning.starts import inside, scattered
-from base_station.planning.tasks import Step
+from base_station.planning.tasks.starts import inside, scattered
+from base_station.planning.tasks.task import Step
 from base_station.twin import (
     EAST,
     HELD_EAST,

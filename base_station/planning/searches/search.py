@@ -11,9 +11,9 @@ from collections.abc import Callable, Generator
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.planning.alpha import AlphaProblem, nominal_returns
 from base_station.planning.attempts import Attempt, Progress
-from base_station.planning.candidates import (
+from base_station.planning.tasks.alpha import AlphaProblem, nominal_returns
+from base_station.planning.tasks.candidates import (
     CANDIDATES,
     NOTHING,
     best_of,

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from base_station.planning.alpha import AlphaProblem
-from base_station.planning.search import ROUND, Proposals
+from base_station.planning.searches.search import ROUND, Proposals
+from base_station.planning.tasks.alpha import AlphaProblem
 
 
 def stepwise(problem: AlphaProblem, rng: np.random.Generator) -> Proposals:

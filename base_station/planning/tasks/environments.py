@@ -10,9 +10,9 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.planning.alpha import AlphaProblem, AlphaTask
-from base_station.planning.beta import BetaProblem, BetaTask
-from base_station.planning.tasks import Task
+from base_station.planning.tasks.alpha import AlphaProblem, AlphaTask
+from base_station.planning.tasks.beta import BetaProblem, BetaTask
+from base_station.planning.tasks.task import Task
 
 Observation = NDArray[np.float32]
 Action = NDArray[np.float32]

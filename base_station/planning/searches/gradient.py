@@ -6,8 +6,8 @@ paper's argument for reinforcement learning. Numbers in docs/reproduction.md.
 
 import numpy as np
 
-from base_station.planning.alpha import AlphaProblem
-from base_station.planning.search import Proposals
+from base_station.planning.searches.search import Proposals
+from base_station.planning.tasks.alpha import AlphaProblem
 
 SPREAD = 0.3  # of the first plan's actions
 DIFFERENCE = 0.05

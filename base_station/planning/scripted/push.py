@@ -4,8 +4,8 @@ feasible, and what a learned policy must beat; it plans nothing and is not sent 
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.planning.around import get_behind
-from base_station.planning.beta import BetaProblem
+from base_station.planning.scripted.around import get_behind
+from base_station.planning.tasks.beta import BetaProblem
 from base_station.twin import EAST, NORTH
 
 Array = NDArray[np.float64]

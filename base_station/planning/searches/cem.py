@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from base_station.planning.alpha import AlphaProblem
-from base_station.planning.search import ROUND, Proposals
-from base_station.planning.shooting import stretched, stretches
+from base_station.planning.searches.search import ROUND, Proposals
+from base_station.planning.searches.shooting import stretched, stretches
+from base_station.planning.tasks.alpha import AlphaProblem
 
 ELITES = 8
 SIGMA = 0.7  # at first

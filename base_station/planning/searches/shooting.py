@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.planning.alpha import AlphaProblem
-from base_station.planning.search import ROUND, Proposals
+from base_station.planning.searches.search import ROUND, Proposals
+from base_station.planning.tasks.alpha import AlphaProblem
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""Scripts that know what a push is. They tell what is feasible."""

@@ -1,0 +1,1 @@
+"""Searches for an experiment: they propose open-loop plans, the twin scores them."""

@@ -1,0 +1,123 @@
+"""One attempt of each planner, all behind one interface: view, request, seed and progress."""
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from base_station.planning.actors import Actor, Gaussian
+from base_station.planning.attempts import Attempt, Progress, Try
+from base_station.planning.learning.discrete import command_list
+from base_station.planning.learning.dqn import learn_dqn
+from base_station.planning.learning.lesson import Learned, Lesson
+from base_station.planning.learning.ppo import train, train_lstm
+from base_station.planning.learning.presets import PRESETS, Preset
+from base_station.planning.learning.qtable import learn_table
+from base_station.planning.problems import alpha_problem, beta_problem
+from base_station.planning.requests import PlanRequest
+from base_station.planning.scripted.ram import ram
+from base_station.planning.searches.cem import cem
+from base_station.planning.searches.gradient import gradient
+from base_station.planning.searches.search import Search, search
+from base_station.planning.searches.shooting import shooting
+from base_station.planning.searches.stepwise import stepwise
+from base_station.planning.tasks.alpha import AlphaProblem, AlphaTask
+from base_station.planning.tasks.beta import BetaTask, success_share
+from base_station.planning.tasks.candidates import NOTHING, best_candidate, better, open_loop_plan
+from hil.scenario import StationView
+
+Learn = Callable[[Lesson, StationView, AlphaProblem], Learned]
+
+SUCCESS_ROLLOUTS = 64
+SUCCESS_SHARE = 0.95
+SEARCHES: dict[str, Search] = {
+    "cem": cem,
+    "shooting": shooting,
+    "random": stepwise,
+    "gradient": gradient,
+    "ram": ram,
+}
+
+
+def try_of(view: StationView, request: PlanRequest) -> tuple[str, Try]:
+    """A planner's name and one attempt of it; the mission is learned by PPO, whatever the scenario
+    says of the experiment."""
+    if request.kind == "beta":
+        return "ppo", learn_beta
+    name = view.planning.planner
+    if name in SEARCHES:
+        return name, partial(search_alpha, SEARCHES[name])
+    return name, partial(learn_alpha, LEARNERS[name])
+
+
+def search_alpha(
+    proposals: Search, view: StationView, request: PlanRequest, seed: int, progress: Progress
+) -> Attempt:
+    """An experiment by a search that is given as many steps as a training."""
+    problem, budget = alpha_problem(view, request), preset_of(request).total_timesteps
+    return search(problem, proposals, seed, view.diagnosis.plan_error, budget, progress)
+
+
+def learn_alpha(
+    learn: Learn, view: StationView, request: PlanRequest, seed: int, progress: Progress
+) -> Attempt:
+    """An experiment that tells the request's hypotheses apart, by a learner."""
+    problem, preset, best = alpha_problem(view, request), preset_of(request), NOTHING
+
+    def target(actor: Actor) -> bool:
+        nonlocal best
+        best = better(best, best_candidate(problem, actor, seed))
+        return best.error <= view.diagnosis.plan_error
+
+    task = AlphaTask(problem, preset.environments, np.random.default_rng(seed))
+    forward = partial(_forward, progress, preset)
+    done = learn(Lesson(task, preset, seed, target, forward), view, problem)
+    took = done.accepted, done.timesteps, done.wall_s, done.curve
+    return Attempt(*took, plan=open_loop_plan(problem, best))
+
+
+def learn_beta(view: StationView, request: PlanRequest, seed: int, progress: Progress) -> Attempt:
+    """A policy for what is left of the mission under the verdict."""
+    problem, preset = beta_problem(view, request), preset_of(request)
+
+    def target(actor: Actor) -> bool:
+        assert isinstance(actor, Gaussian)
+        rng = np.random.default_rng([seed, 1])
+        return success_share(problem, actor.weights, rng, SUCCESS_ROLLOUTS) >= SUCCESS_SHARE
+
+    task = BetaTask(problem, preset.environments, np.random.default_rng(seed))
+    done = train(Lesson(task, preset, seed, target, partial(_forward, progress, preset)))
+    assert isinstance(done.actor, Gaussian)
+    took = done.accepted, done.timesteps, done.wall_s, done.curve
+    return Attempt(*took, policy=done.actor.weights)
+
+
+def preset_of(request: PlanRequest) -> Preset:
+    return PRESETS[request.preset, request.kind]
+
+
+def _forward(progress: Progress, preset: Preset, timesteps: int, mean_reward: float) -> None:
+    progress(timesteps, preset.total_timesteps, mean_reward)
+
+
+def _ppo(lesson: Lesson, _view: StationView, _problem: AlphaProblem) -> Learned:
+    return train(lesson)
+
+
+def _lstm(lesson: Lesson, _view: StationView, _problem: AlphaProblem) -> Learned:
+    return train_lstm(lesson)
+
+
+def _table(lesson: Lesson, view: StationView, problem: AlphaProblem) -> Learned:
+    places = (
+        2 * problem.model.size
+    )  # where the first twin believes all to be, seen from the suspect
+    choices = command_list(problem.commands)
+    return learn_table(lesson, choices, view.planning.exploration, places)
+
+
+def _dqn(lesson: Lesson, view: StationView, problem: AlphaProblem) -> Learned:
+    return learn_dqn(lesson, command_list(problem.commands), view.planning.exploration)
+
+
+LEARNERS: dict[str, Learn] = {"ppo": _ppo, "ppo_lstm": _lstm, "qtable": _table, "dqn": _dqn}
