@@ -2,13 +2,15 @@
 
 from dataclasses import dataclass, replace
 
+from base_station.autopilots import adapter
 from base_station.commands import Arm, Command, Drive, SetMode
 from base_station.execution import Orders
 from base_station.telemetry import Status, Track
-from hil.mavlink import RoverMode
+from hil.mavlink import stick
 from hil.scenario import StationView
 
 REPEAT_S = 0.5
+STICK_US = 100
 TAKEOVER_S = 2.5  # longer than two heartbeats: a late one must not look like a takeover
 
 
@@ -16,9 +18,12 @@ TAKEOVER_S = 2.5  # longer than two heartbeats: a late one must not look like a 
 class _Sent:
     """The mode asked for last, when, and since when the vehicle has said something else."""
 
-    mode: RoverMode | None = None
+    mode: int | None = None
     time_s: float = float("-inf")
     confirmed: bool = False
+    obeyed: bool = False  # it has been in a mode of ours
+    was_armed: bool = False
+    sticks_us: tuple[int, ...] = ()  # where a pilot's sticks were at first
     strayed_since_s: float | None = None
 
 
@@ -27,6 +32,7 @@ class Commander:
 
     def __init__(self, view: StationView) -> None:
         self._view = view
+        self.autopilots = tuple(adapter(m.autopilot, m.frame) for m in view.fleet)
         self._sent = [_Sent() for _ in view.fleet]
         self._arm_sent_s = [float("-inf")] * len(view.fleet)
         self.released: set[int] = set()
@@ -40,7 +46,7 @@ class Commander:
                 commands.append(Arm(member.sysid))
         return commands
 
-    def mode_asked(self, index: int) -> RoverMode | None:
+    def mode_asked(self, index: int) -> int | None:
         return self._sent[index].mode
 
     def carry_out(self, orders: Orders, tracks: list[Track], time_s: float) -> list[Command]:
@@ -49,9 +55,11 @@ class Commander:
         for i, member in enumerate(self._view.fleet):
             if i in self.released:
                 continue
+            if self._is_strayed(i, tracks[i].status, time_s):
+                continue
             driven = bool(orders.driven[i])
             commands += self._mode(i, member.sysid, driven, tracks[i].status, time_s)
-            if driven:
+            if driven or self.autopilots[i].needs_setpoints_first:
                 north, east, yaw = (float(x) for x in orders.setpoints[i])
                 heading = None if yaw != yaw else yaw
                 commands.append(Drive(member.sysid, time_s, north, east, heading))
@@ -60,23 +68,46 @@ class Commander:
     def _mode(
         self, index: int, sysid: int, driven: bool, status: Status, time_s: float
     ) -> list[Command]:
-        wanted = RoverMode.GUIDED if driven else RoverMode.HOLD
+        autopilot = self.autopilots[index]
+        wanted = autopilot.driven_mode if driven else autopilot.hold_mode
         sent = self._sent[index]
-        changed = sent.mode is not wanted
+        changed = sent.mode != wanted
         if status.mode == wanted and not changed:
-            self._sent[index] = replace(sent, confirmed=True, strayed_since_s=None)
-            return []
-        if sent.confirmed and not changed:
-            since = time_s if sent.strayed_since_s is None else sent.strayed_since_s
-            self._sent[index] = replace(sent, strayed_since_s=since)
+            self._sent[index] = replace(sent, confirmed=True)
             return []
         if not changed and time_s - sent.time_s < REPEAT_S:
             return []
-        self._sent[index] = _Sent(wanted, time_s)
+        self._sent[index] = replace(sent, mode=wanted, time_s=time_s, confirmed=False)
         return [SetMode(sysid, wanted)]
 
+    def _is_strayed(self, index: int, status: Status, time_s: float) -> bool:
+        """Whether somebody else has this vehicle: it gets no command while that may be so."""
+        autopilot, sent = self.autopilots[index], self._sent[index]
+        was_armed = sent.was_armed or status.armed
+        sticks_us = sent.sticks_us or status.sticks_us
+        ours = (autopilot.driven_mode, autopilot.hold_mode)
+        obeyed = sent.obeyed or status.mode in ours
+        left = sent.confirmed and status.mode != sent.mode
+        foreign = obeyed and status.mode not in ours
+        strayed = left or foreign or (was_armed and not status.armed)
+        strayed = strayed or _moved(sticks_us, status.sticks_us)
+        since_s = (
+            (time_s if sent.strayed_since_s is None else sent.strayed_since_s) if strayed else None
+        )
+        self._sent[index] = replace(
+            sent, was_armed=was_armed, sticks_us=sticks_us, obeyed=obeyed, strayed_since_s=since_s
+        )
+        return strayed
+
+    def all_holding(self, tracks: list[Track]) -> bool:
+        """Everybody armed, and in the mode in which it stands."""
+        return all(
+            t.status.armed and t.status.mode == autopilot.hold_mode
+            for t, autopilot in zip(tracks, self.autopilots, strict=True)
+        )
+
     def takeovers(self, time_s: float) -> list[int]:
-        """Vehicles that left a mode they had confirmed, with no command of ours."""
+        """Vehicles in a mode, disarmed, or under sticks, with no command of ours."""
         return [
             i
             for i, sent in enumerate(self._sent)
@@ -84,3 +115,11 @@ class Commander:
             and sent.strayed_since_s is not None
             and time_s - sent.strayed_since_s >= TAKEOVER_S
         ]
+
+
+def _moved(before_us: tuple[int, ...], now_us: tuple[int, ...]) -> bool:
+    """Whether a pilot's stick is not where it was; channels that are not there do not count."""
+    pairs = zip(before_us, now_us, strict=False)
+    return any(
+        stick(a) is not None and stick(b) is not None and abs(a - b) > STICK_US for a, b in pairs
+    )

@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from hil.mavlink import Encoder, RoverMode
+from base_station.autopilots import Autopilot
+from hil.mavlink import Encoder
 
 
 @dataclass(frozen=True)
@@ -12,10 +13,10 @@ class Arm:
 
 @dataclass(frozen=True)
 class SetMode:
-    """MAV_CMD_DO_SET_MODE; HOLD means motors zero."""
+    """MAV_CMD_DO_SET_MODE; `mode` is the custom mode that the heartbeat should then carry."""
 
     sysid: int
-    mode: RoverMode
+    mode: int
 
 
 @dataclass(frozen=True)
@@ -45,17 +46,15 @@ class AskTime:
 Command = Arm | SetMode | Drive | Heartbeat | AskTime
 
 
-def encode(command: Command, encoder: Encoder) -> bytes:
-    """The one datagram that says `command`."""
+def encode(command: Command, encoder: Encoder, autopilot: Autopilot) -> bytes:
+    """The one datagram that says `command` to a vehicle with that autopilot."""
     match command:
         case Arm(sysid):
             return encoder.arm(sysid)
         case SetMode(sysid, mode):
-            return encoder.set_mode(sysid, mode)
+            return autopilot.set_mode(encoder, sysid, mode)
         case Drive(sysid, time_s, north_mps, east_mps, yaw_rad):
-            return encoder.velocity_setpoint(
-                sysid, round(time_s * 1000), north_mps, east_mps, yaw_rad
-            )
+            return autopilot.velocity(encoder, sysid, time_s, north_mps, east_mps, yaw_rad)
         case Heartbeat():
             return encoder.gcs_heartbeat()
         case AskTime(_, ts1_ns):

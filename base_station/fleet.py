@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from base_station.autopilots import adapter
 from base_station.fleet_clock import FleetClock
 from base_station.telemetry import Frame, Sample, Track, frame_at, note
 from hil import mavlink
@@ -18,6 +19,7 @@ class Fleet:
         self.view = view
         self.tracks = [Track() for _ in view.fleet]
         self._clock = FleetClock(tuple(m.sysid for m in view.fleet))
+        self._autopilots = [adapter(m.autopilot, m.frame) for m in view.fleet]
         self._next_tick = 0  # in ticks of 1 / telemetry_hz of fleet time
 
     @property
@@ -52,7 +54,10 @@ class Fleet:
     @property
     def complete(self) -> bool:
         """All vehicles heard, located, and ready to arm."""
-        return all(t.status.heard and t.status.ready and t.samples for t in self.tracks)
+        return all(
+            t.status.heard and t.samples and autopilot.ready(t.status)
+            for t, autopilot in zip(self.tracks, self._autopilots, strict=True)
+        )
 
     def start_ticks(self) -> None:
         """Begin with the first whole tick from now on."""

@@ -73,7 +73,7 @@ class StationNode:
         out = self.station.step(wall_s, received, self._answers())
         for command in out.commands:
             index = self._sysids.index(command.sysid)
-            datagram = encode(command, self._encoders[index])
+            datagram = encode(command, self._encoders[index], self.station.autopilots[index])
             self._links[index].send(datagram)
             self._log(index, epoch_us, datagram)
         for listener in self._listeners:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from base_station import execution
+from base_station.autopilots import adapter
 from base_station.execution import Orders
 from base_station.fleet import Fleet
 from hil import mavlink
-from hil.mavlink import RoverMode
 from hil.scenario import StationView
 
 TIMEOUT_S = 3.0  # an autopilot forgets a set-point that is older
@@ -23,9 +23,9 @@ Setpoint = tuple[float, float, float]  # north, east (m/s), yaw (rad, NaN: not c
 
 @dataclass(frozen=True)
 class SentOrders:
-    """Per vehicle, in fleet order: modes and set-points by the fleet time they were sent at."""
+    """Per vehicle, in fleet order: driven or not, and set-points, by the fleet time of sending."""
 
-    modes: tuple[tuple[tuple[float, int], ...], ...]
+    modes: tuple[tuple[tuple[float, bool], ...], ...]
     setpoints: tuple[tuple[tuple[float, Setpoint], ...], ...]
 
     def at(self, time_s: float) -> Orders:
@@ -33,7 +33,7 @@ class SentOrders:
         orders = execution.hold(len(self.modes))
         for k in range(len(self.modes)):
             mode, setpoint = _latest(self.modes[k], time_s), _latest(self.setpoints[k], time_s)
-            if mode is None or setpoint is None or mode[1] != RoverMode.GUIDED:
+            if mode is None or setpoint is None or not mode[1]:
                 continue
             if time_s - setpoint[0] <= TIMEOUT_S:
                 orders.setpoints[k] = setpoint[1]
@@ -45,7 +45,8 @@ def sent_orders(view: StationView, heard: Iterable[tuple[int, mavlink.Received]]
     """Gather DO_SET_MODE and SET_POSITION_TARGET_LOCAL_NED from messages of both directions."""
     index = {m.sysid: k for k, m in enumerate(view.fleet)}
     fleet = Fleet(view)
-    modes: list[list[tuple[float, int]]] = [[] for _ in view.fleet]
+    autopilots = [adapter(m.autopilot, m.frame) for m in view.fleet]
+    modes: list[list[tuple[float, bool]]] = [[] for _ in view.fleet]
     setpoints: list[list[tuple[float, Setpoint]]] = [[] for _ in view.fleet]
     for time_us, message in heard:
         if message.sysid in index:
@@ -55,8 +56,9 @@ def sent_orders(view: StationView, heard: Iterable[tuple[int, mavlink.Received]]
         tick_s = math.floor(newest_s / fleet.period_s + EARLY_S) * fleet.period_s
         match message.value:
             case mavlink.CommandLong(command=mavlink.Command.DO_SET_MODE) as command:
-                if command.target_sysid in index:
-                    modes[index[command.target_sysid]].append((tick_s, int(command.params[1])))
+                k = index.get(command.target_sysid)
+                if k is not None:
+                    modes[k].append((tick_s, autopilots[k].drives(command)))
             case mavlink.LocalSetpoint(velocity_mps=(north, east, _)) as command:
                 stamped = abs(command.time_s - newest_s) < TRUSTED_S
                 yaw = math.nan if command.yaw_rad is None else command.yaw_rad

@@ -64,6 +64,7 @@ class Station:
         self.desk = Desk(view)
         self._decide = decide or own_decision
         self._commander = Commander(view)
+        self.autopilots = self._commander.autopilots
         self._touched_s: dict[tuple[int, int], float] = {}
         self._beats_s = (float("-inf"), float("-inf"))  # last heartbeat: wall, fleet
         self._asked_time_s = float("-inf")

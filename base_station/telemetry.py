@@ -35,7 +35,10 @@ class Status:
     motor_outputs: tuple[float, ...] = ()
     battery_percent: float = float("nan")
     gps_satellites: int = 0
-    ready: bool = False  # SYS_STATUS pre-arm health
+    sticks_us: tuple[int, ...] = ()  # RC_CHANNELS 1 to 4, where a pilot has a transmitter
+    gps_fix: int = 0  # GPS_FIX_TYPE
+    ekf_flags: int = 0  # EKF_STATUS_FLAGS
+    prearm_ok: bool = False  # SYS_STATUS
 
 
 @dataclass(frozen=True)
@@ -94,9 +97,13 @@ def note(status: Status, value: object, motors: int) -> Status:
         case mavlink.Battery():
             return replace(status, battery_percent=value.remaining_percent)
         case mavlink.GpsRaw():
-            return replace(status, gps_satellites=value.satellites)
+            return replace(status, gps_satellites=value.satellites, gps_fix=value.fix_type)
+        case mavlink.RcChannels():
+            return replace(status, sticks_us=value.channels_us[:4])
+        case mavlink.EkfStatus():
+            return replace(status, ekf_flags=value.flags)
         case mavlink.SysStatus():
-            return replace(status, ready=bool(value.health & mavlink.Sensor.PREARM_CHECK))
+            return replace(status, prearm_ok=bool(value.health & mavlink.Sensor.PREARM_CHECK))
         case _:
             return status
 

@@ -9,7 +9,6 @@ from base_station.phases import Arming, Connecting, Probing
 from base_station.steps.travelling import request_beta
 from base_station.telemetry import Frame
 from base_station.watch import Baseline, Watch
-from hil.mavlink import RoverMode
 
 
 def get_ready(desk: Desk, commander: Commander) -> list[Command]:
@@ -22,7 +21,7 @@ def get_ready(desk: Desk, commander: Commander) -> list[Command]:
         desk.enter(Arming())
     commands = commander.carry_out(desk.orders, tracks, desk.time_s)
     commands += commander.arm(tracks, desk.time_s)
-    if all(t.status.armed and t.status.mode == RoverMode.HOLD for t in tracks):
+    if commander.all_holding(tracks):
         desk.fleet.start_ticks()
         desk.watch = _fresh_watch(desk)
         desk.enter(Probing(desk.time_s))

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from base_station.autopilots import adapter
 from base_station.hypotheses import candidates
 from hil.airframe import push_margin
 from hil.bench.onsets import Onsets
@@ -39,8 +40,17 @@ def margin(scenario: Scenario, pushed: Vehicle, axis: str) -> float:
 
 def refuse_hopeless(path: Path, scenario: Scenario) -> None:
     """Raises InputError for an expectation that no run can meet."""
+    _refuse_unknown_autopilot(path, scenario)
     _refuse_unknown_hypothesis(path, scenario)
     _refuse_weak_rescue(path, scenario)
+
+
+def _refuse_unknown_autopilot(path: Path, scenario: Scenario) -> None:
+    for i, v in enumerate(scenario.fleet):
+        try:
+            adapter(v.autopilot, v.frame)
+        except InputError as error:
+            raise InputError(f"{path}: fleet.{i}.{error}") from None
 
 
 def _refuse_unknown_hypothesis(path: Path, scenario: Scenario) -> None:

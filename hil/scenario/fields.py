@@ -19,6 +19,7 @@ Port = Annotated[int, Field(ge=1024, le=MAX_PORT)]
 Metres = Annotated[float, Field(ge=-100_000, le=100_000)]  # the earth is flat within these
 Horizon = Annotated[float, Field(gt=0, le=600)]
 Seed = Annotated[int, Field(ge=0, le=2**31 - 1)]
+AutopilotName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]  # a known one: station
 VehicleName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
 Share = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)]
 Seconds = Annotated[float, Field(ge=0, le=60)]

@@ -10,6 +10,7 @@ from hil.errors import InputError
 from hil.scenario.checks import keep_inside, unique
 from hil.scenario.fields import (
     PORTS_PER_VEHICLE,
+    AutopilotName,
     Finite,
     GroundSysId,
     Model,
@@ -39,6 +40,7 @@ class FleetMember(Model):
     name: VehicleName
     sysid: SysId
     airframe: Annotated[str, AfterValidator(_twinned_airframe)]
+    autopilot: AutopilotName = "testbed"
     start_yaw_deg: Finite
     goal: Point
     mavlink_port: Port
@@ -92,6 +94,7 @@ def station_view(scenario: Scenario, mavlink_port_base: int, station_seed: int) 
             name=v.name,
             sysid=v.sysid,
             airframe=v.airframe,
+            autopilot=v.autopilot,
             start_yaw_deg=v.start_yaw_deg,
             goal=v.goal,
             mavlink_port=mavlink_port_base + PORTS_PER_VEHICLE * i,

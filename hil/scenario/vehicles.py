@@ -8,6 +8,7 @@ from hil import airframe as airframes
 from hil.airframe import Airframe
 from hil.scenario.fields import (
     AirframeName,
+    AutopilotName,
     Finite,
     Model,
     NonNegative,
@@ -38,6 +39,7 @@ class Vehicle(Model):
     name: VehicleName
     sysid: SysId
     airframe: AirframeName = "omni_plus"
+    autopilot: AutopilotName = "testbed"
     start: Point
     start_yaw_deg: Finite = 0.0
     goal: Point

@@ -110,3 +110,8 @@ def test_the_command_line_imports_nothing_heavy() -> None:
         [sys.executable, "-c", code, str(RESCUE)], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_an_autopilot_nobody_has_an_adapter_for_is_refused() -> None:
+    with pytest.raises(InputError, match=r"fleet\.1\.autopilot = 'betaflight'"):
+        refuse_hopeless(Path("x.yaml"), rescue("fleet.1.autopilot=betaflight"))

@@ -61,3 +61,59 @@ def test_arming_is_asked_only_of_those_that_are_not_armed(rescue_view: StationVi
     assert commander.arm(tracks, 0.0) == [Arm(3)]
     assert commander.arm(tracks, 0.2) == []
     assert commander.arm(tracks, 0.6) == [Arm(3)]
+
+
+def test_while_a_strange_mode_lasts_nothing_is_sent_even_if_the_orders_change(
+    rescue_view: StationView,
+) -> None:
+    commander = Commander(rescue_view)
+    commander.carry_out(hold(3), _tracks(RoverMode.HOLD), 0.0)
+    strayed = _tracks(RoverMode.HOLD)
+    strayed[0].status = replace(strayed[0].status, mode=int(RoverMode.MANUAL))
+    assert commander.carry_out(_drive_first(), strayed, 1.0) == []
+    assert commander.carry_out(_drive_first(), _tracks(RoverMode.HOLD), 1.5) != []
+
+
+def test_a_failsafe_that_leaves_the_driven_mode_is_not_argued_with(
+    rescue_view: StationView,
+) -> None:
+    commander, orders = Commander(rescue_view), _drive_first()
+    commander.carry_out(orders, _tracks(RoverMode.HOLD), 0.0)
+    guided = _tracks(RoverMode.HOLD)
+    guided[0].status = replace(guided[0].status, mode=int(RoverMode.GUIDED))
+    commander.carry_out(orders, guided, 0.1)
+    assert commander.carry_out(orders, _tracks(RoverMode.HOLD), 1.0) == []
+    commander.carry_out(orders, _tracks(RoverMode.HOLD), 1.0 + TAKEOVER_S)
+    assert commander.takeovers(1.0 + TAKEOVER_S) == [0]
+
+
+def test_a_disarm_nobody_commanded_is_a_takeover(rescue_view: StationView) -> None:
+    commander, orders = Commander(rescue_view), hold(3)
+    commander.carry_out(orders, _tracks(RoverMode.HOLD), 0.0)
+    disarmed = _tracks(RoverMode.HOLD)
+    disarmed[2].status = replace(disarmed[2].status, armed=False)
+    for time_s in (1.0, 1.0 + TAKEOVER_S):
+        commander.carry_out(orders, disarmed, time_s)
+    assert commander.takeovers(1.0 + TAKEOVER_S) == [2]
+
+
+def test_a_pilot_who_moves_a_stick_is_a_takeover(rescue_view: StationView) -> None:
+    commander, orders = Commander(rescue_view), hold(3)
+    rest, moved = _tracks(RoverMode.HOLD), _tracks(RoverMode.HOLD)
+    rest[1].status = replace(rest[1].status, sticks_us=(1500, 65535, 1500, 0))
+    moved[1].status = replace(moved[1].status, sticks_us=(1500, 1200, 1700, 0))
+    commander.carry_out(orders, rest, 0.0)
+    for time_s in (1.0, 1.0 + TAKEOVER_S):
+        commander.carry_out(orders, moved, time_s)
+    assert commander.takeovers(1.0 + TAKEOVER_S) == [1]
+
+
+def test_an_autopilot_that_wants_setpoints_first_gets_them_while_it_holds(
+    rescue_view: StationView,
+) -> None:
+    members = [m.model_copy(update={"autopilot": "px4"}) for m in rescue_view.fleet]
+    view = rescue_view.model_copy(update={"fleet": tuple(members)})
+    commands = Commander(view).carry_out(hold(3), _tracks(RoverMode.HOLD), 1.0)
+    assert [c for c in commands if isinstance(c, Drive)] == [
+        Drive(sysid, 1.0, 0.0, 0.0, None) for sysid in (1, 2, 3)
+    ]
