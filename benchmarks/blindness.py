@@ -50,7 +50,7 @@ def features(name: str, seed: int) -> np.ndarray:
     scenario = load_scenario(SCENARIOS / f"{name}.yaml", [f"seed={seed}"])
     heard = Positions()
     rig = Rig(scenario, blind_view(scenario), [heard])
-    breaker = Breaker(scenario, lambda _: None)
+    breaker = Breaker(scenario, lambda _: None, lambda _: None, rig.simulation.obey)
     breaker.strike(Onsets(scenario).at_start())
     while not breaker.done:
         for vehicle, link in zip(scenario.fleet, rig.injector_links, strict=True):

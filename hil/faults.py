@@ -126,6 +126,12 @@ KINDS: dict[tuple[Unit, Type], Kind] = {
 
 SUPPORTED = frozenset(KINDS)
 
+# What the world can do to motor outputs on their way in, and to a position on its way out.
+WORLD_KINDS = (
+    *((unit, kind) for unit, kind in KINDS if unit is Unit.MOTOR),
+    *((Unit.GPS, t) for t in (Type.STUCK, Type.OFFSET, Type.GLITCH, Type.DRIFT, Type.DELAY)),
+)
+
 
 @dataclass(frozen=True)
 class Fault:

@@ -1,7 +1,8 @@
 """The injector: breaks a vehicle over MAVLink, from its own system id, on its own link (pure).
 
 `step(now, received)` returns what to send; the same code runs over UDP and in memory. Parameters
-go first, then commands, one at a time, each sent again until it is echoed or acknowledged.
+go first, then commands, one at a time, each sent again until it is echoed or acknowledged. Faults
+that the world applies go to the world instead, and never near a vehicle.
 """
 
 import math
@@ -10,7 +11,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from hil.errors import InputError, ProcessDiedError
-from hil.faults import to_injection
+from hil.faults import Injection, to_clearing, to_injection
 from hil.mavlink import (
     COMPONENT_GCS,
     Command,
@@ -23,6 +24,7 @@ from hil.mavlink import (
     Result,
 )
 from hil.scenario import FaultModel, Scenario
+from hil.world.orders import Break, Mend
 
 RESEND_S = 0.5
 ANSWER_WITHIN_S = 10.0
@@ -77,6 +79,7 @@ class InjectFailure:
 
 
 Order = SetParameter | InjectFailure
+Report = Callable[[FaultModel], None]
 
 
 class Injector:
@@ -95,8 +98,7 @@ class Injector:
         """Everything that was added is in effect."""
         return not self._orders
 
-    def add(self, fault: FaultModel) -> None:
-        injection = to_injection(fault.fault(), fault.announced)
+    def add(self, injection: Injection) -> None:
         self._orders += [SetParameter(name, value) for name, value in injection.parameters]
         self._orders += [InjectFailure(*numbers) for numbers in injection.commands]
 
@@ -130,27 +132,52 @@ class Injector:
 
 
 class Breaker:
-    """Makes faults happen, over one injector per vehicle, and reports those in effect.
+    """Makes faults happen and end, over one injector per vehicle or by the world.
 
-    `report` gets each fault once its last order has been confirmed.
+    `struck` gets each fault once its last order has been confirmed, `mended` each that has ended
+    so. The world's orders go to `to_world`, which confirms them by taking them.
     """
 
-    def __init__(self, scenario: Scenario, report: Callable[[FaultModel], None]) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        struck: Report,
+        mended: Report,
+        to_world: Callable[[Break | Mend], None],
+    ) -> None:
         sysid = scenario.links.injector_sysid
         self._injectors = {v.sysid: Injector(v.name, v.sysid, sysid) for v in scenario.fleet}
-        self._waiting: dict[int, list[FaultModel]] = {v.sysid: [] for v in scenario.fleet}
-        self._report = report
+        self._waiting: dict[int, list[tuple[Report, FaultModel]]] = {
+            v.sysid: [] for v in scenario.fleet
+        }
+        self._struck, self._mended, self._to_world = struck, mended, to_world
 
     @property
     def done(self) -> bool:
-        """Every fault asked for is in effect."""
+        """Every fault asked for is in effect, or over."""
         return not any(self._waiting.values())
 
     def strike(self, faults: Iterable[FaultModel]) -> None:
         """Ask for faults, from the next step on."""
         for fault in faults:
-            self._injectors[fault.vehicle].add(fault)
-            self._waiting[fault.vehicle].append(fault)
+            injection = to_injection(fault.fault(), fault.announced)
+            self._ask(fault, injection, Break(fault), self._struck)
+
+    def mend(self, faults: Iterable[FaultModel]) -> None:
+        """Ask for the end of faults, from the next step on."""
+        for fault in faults:
+            clearing = to_clearing(fault.fault().unit, fault.instances)
+            self._ask(fault, clearing, Mend(fault), self._mended)
+
+    def _ask(
+        self, fault: FaultModel, injection: Injection, order: Break | Mend, report: Report
+    ) -> None:
+        if fault.by_world:
+            self._to_world(order)
+            report(fault)
+        else:
+            self._injectors[fault.vehicle].add(injection)
+            self._waiting[fault.vehicle].append((report, fault))
 
     def step(self, now_s: float, sysid: int, datagrams: Iterable[bytes]) -> list[bytes]:
         """What has come from a vehicle's injector port; returns what goes there.
@@ -161,6 +188,6 @@ class Breaker:
         outgoing = injector.step(now_s, datagrams)
         if injector.done:
             done, self._waiting[sysid] = self._waiting[sysid], []
-            for fault in done:
-                self._report(fault)
+            for report, fault in done:
+                report(fault)
         return outgoing

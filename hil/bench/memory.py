@@ -29,7 +29,12 @@ def run_in_memory(
         view = blind_view(scenario)
         listeners = open_listeners(stack, folder, run_id, view, viewer, log.station)
         rig = Rig(scenario, view, listeners)
-        breaker = Breaker(scenario, lambda fault: log.struck(fault, rig.time_s))
+        breaker = Breaker(
+            scenario,
+            lambda fault: log.struck(fault, rig.time_s),
+            lambda fault: log.mended(fault, rig.time_s),
+            rig.simulation.obey,
+        )
         breaker.strike(onsets.at_start())
         while not breaker.done:
             _inject(rig, breaker, scenario)
@@ -48,6 +53,7 @@ def _tell(advance: Advance, log: RunLog, breaker: Breaker, onsets: Onsets) -> No
     for record in advance.truth:
         log.truth(record)
         breaker.strike(onsets.due(record))
+        breaker.mend(onsets.over(record))
     for episode in advance.contacts:
         log.contact(episode)
 

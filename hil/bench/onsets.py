@@ -1,4 +1,4 @@
-"""When faults strike: at a world time, or when a condition on the truth first holds (pure)."""
+"""When faults strike, at a world time or on a condition on the truth, and when they end (pure)."""
 
 import math
 import operator
@@ -50,7 +50,10 @@ def parse_condition(scenario: Scenario, text: str) -> Condition:
 
 
 class Onsets:
-    """The faults that have not struck yet. Raises InputError for a condition it can't read."""
+    """The faults that have not struck yet, and those that have not ended.
+
+    Raises InputError for a condition it can't read.
+    """
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
@@ -58,6 +61,7 @@ class Onsets:
             (f, parse_condition(scenario, f.onset.when) if f.onset.when else None)
             for f in scenario.faults
         ]
+        self._ending: list[FaultModel] = []
 
     def at_start(self) -> tuple[FaultModel, ...]:
         """The faults of onset zero: these are in effect before the world's first step."""
@@ -71,11 +75,23 @@ class Onsets:
                 return condition.holds(self._scenario, record)
             return fault.onset.at_s is not None and record.time_s >= fault.onset.at_s - 1e-9
 
+        self._pending = [(f, c) for f, c in self._pending if not _is_over(f, record.time_s)]
         return self._take(strikes)
+
+    def over(self, record: TruthRecord) -> tuple[FaultModel, ...]:
+        """The faults that end now; each is returned once."""
+        over = tuple(f for f in self._ending if _is_over(f, record.time_s))
+        self._ending = [f for f in self._ending if f not in over]
+        return over
 
     def _take(
         self, strikes: Callable[[FaultModel, Condition | None], bool]
     ) -> tuple[FaultModel, ...]:
         struck = tuple(fault for fault, condition in self._pending if strikes(fault, condition))
         self._pending = [p for p in self._pending if not strikes(*p)]
+        self._ending += [fault for fault in struck if fault.until_s is not None]
         return struck
+
+
+def _is_over(fault: FaultModel, time_s: float) -> bool:
+    return fault.until_s is not None and time_s >= fault.until_s - 1e-9

@@ -95,7 +95,13 @@ class RunLog:
     def struck(self, fault: FaultModel, time_s: float) -> None:
         """The injector's orders for a fault have been confirmed."""
         self._struck.append(Struck(fault, time_s))
-        text = describe_fault(self._scenario, fault)
+        self._tell_fault(fault, time_s, describe_fault(self._scenario, fault))
+
+    def mended(self, fault: FaultModel, time_s: float) -> None:
+        """A fault has ended, as the scenario says. It stays one of those that have struck."""
+        self._tell_fault(fault, time_s, f"{describe_fault(self._scenario, fault)} ends")
+
+    def _tell_fault(self, fault: FaultModel, time_s: float, text: str) -> None:
         data = fault.model_dump(mode="json", exclude={"onset"})
         if self._observer:
             self._observer.fault(time_s, text)

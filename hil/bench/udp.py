@@ -15,6 +15,7 @@ from hil.bench.runlog import RunLog
 from hil.bench.watchdog import Watchdog
 from hil.link import UdpLink
 from hil.scenario import PORTS_PER_VEHICLE, Scenario
+from hil.world.orders import Until, order_line
 from hil.world.truth import TruthRecord, parse_line
 
 READY_WITHIN_S = 180.0  # the first start ever compiles kernels
@@ -60,7 +61,13 @@ class _Run:
     ) -> None:
         self._scenario, self._folders, self._options = scenario, folders, options
         self._log, self._onsets = log, onsets
-        self._breaker = Breaker(scenario, lambda fault: log.struck(fault, log.world_s))
+        self._world: Child  # from `_start` on
+        self._breaker = Breaker(
+            scenario,
+            lambda fault: log.struck(fault, log.world_s),
+            lambda fault: log.mended(fault, log.world_s),
+            lambda order: self._world.send(order_line(order)),
+        )
         self._injector_links: dict[int, UdpLink] = {}
         self._leash = Leash(options.speed)
 
@@ -68,10 +75,10 @@ class _Run:
         with ExitStack() as stack:
             children = stack.enter_context(Children(self._heard))
             self._open_injector_links(stack)
-            world, station = self._start(children)
+            self._world, station = self._start(children)
             children.wait_ready(READY_WITHIN_S)
             self._break_at_zero(children)
-            self._drive(children, world)
+            self._drive(children)
             children.wait_end(station, FAREWELL_S)
 
     def _start(self, children: Children) -> tuple[Child, Child]:
@@ -117,12 +124,12 @@ class _Run:
             self._inject()
             children.pump(POLL_S)
 
-    def _drive(self, children: Children, world: Child) -> None:
+    def _drive(self, children: Children) -> None:
         watchdog = Watchdog(self._options.speed, time.monotonic())
         while self._log.outcome is None:
             now_s = time.monotonic()
             if self._leash.lengthen(self._log.tick_s, self._log.learning, now_s):
-                world.send(f"until {self._leash.until_s:.6f}")
+                self._world.send(order_line(Until(self._leash.until_s)))
             children.pump(POLL_S)
             self._inject()
             watchdog.check(self._log.world_s, self._leash.until_s, self._log.tick_s, now_s)
@@ -141,6 +148,7 @@ class _Run:
             if isinstance(told, TruthRecord):
                 self._log.truth(told)
                 self._breaker.strike(self._onsets.due(told))
+                self._breaker.mend(self._onsets.over(told))
             elif told is not None:
                 self._log.contact(told)
 

@@ -28,20 +28,13 @@ class Pace:
         return max(0.0, due_s - now_s)
 
 
+@dataclass
 class Leash:
-    """The world time not to pass, from lines `until <seconds>`; other lines are ignored."""
+    """The world time not to pass; it only ever gets longer."""
 
-    def __init__(self, until_s: float) -> None:
-        self.until_s = until_s
-        self._rest = b""
+    until_s: float
 
-    def feed(self, data: bytes) -> None:
-        *lines, self._rest = (self._rest + data).split(b"\n")
-        for line in lines:
-            word, _, number = line.decode(errors="replace").partition(" ")
-            if word != "until":
-                continue
-            try:
-                self.until_s = max(self.until_s, float(number))
-            except ValueError:
-                continue
+    def lengthen(self, until_s: float) -> None:
+        """A time that is no number leaves it as it is."""
+        if until_s > self.until_s:
+            self.until_s = until_s

@@ -16,6 +16,7 @@ from typing import TextIO
 from hil.errors import InputError, ProcessDiedError
 from hil.link import PHYSICS_PORT_BASE, UdpLink
 from hil.scenario import Scenario
+from hil.world.orders import OrderReader, Until
 from hil.world.pacing import Leash, Pace
 from hil.world.simulation import Advance, Simulation
 from hil.world.truth import contact_line, truth_line
@@ -90,6 +91,7 @@ class _Server:
     leash: Leash | None = None
     stopping: bool = False
     started_s: float = field(default_factory=time.monotonic)
+    orders: OrderReader = field(default_factory=OrderReader)
 
     def serve(self) -> None:
         for number in (signal.SIGTERM, signal.SIGINT):
@@ -97,6 +99,7 @@ class _Server:
         print("ready", flush=True)
         while not self.stopping:
             self._receive()
+            self._obey()
             now_s = time.monotonic()
             self._check_presence(now_s)
             wait_s = self._wait_s(now_s)
@@ -131,11 +134,19 @@ class _Server:
         sources: list[UdpLink | int] = list(self.links.values())
         if self.leash:
             sources.append(0)
-        readable, _, _ = select.select(sources, [], [], min(wait_s, _POLL_S))
-        if self.leash and 0 in readable:
-            data = os.read(0, 65536)
-            self.leash.feed(data)
-            self.stopping = self.stopping or not data  # whoever held the leash is gone
+        select.select(sources, [], [], min(wait_s, _POLL_S))
+
+    def _obey(self) -> None:
+        """Orders from whoever holds the leash, as soon as they come."""
+        if self.leash is None or not select.select([0], [], [], 0.0)[0]:
+            return
+        data = os.read(0, 65536)
+        self.stopping = self.stopping or not data  # whoever held the leash is gone
+        for order in self.orders.feed(data):
+            if isinstance(order, Until):
+                self.leash.lengthen(order.time_s)
+            else:
+                self.simulation.obey(order)
 
     def _check_presence(self, now_s: float) -> None:
         absent = self.simulation.lockstep.absent()

@@ -4,10 +4,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from hil.faults import to_clearing, to_injection
 from hil.physics_link import decode_frame, encode_state
 from hil.scenario import Scenario
 from hil.world.lockstep import Lockstep
+from hil.world.orders import Break, Mend
 from hil.world.space import World
+from hil.world.tampering import Tampering
 from hil.world.truth import ContactEpisode, ContactLog, TruthRecord
 
 TRUTH_HZ = 10
@@ -30,6 +33,7 @@ class Simulation:
     def __init__(self, scenario: Scenario, seed: int) -> None:
         self.world = World(scenario, seed)
         self.lockstep = Lockstep(tuple(v.sysid for v in scenario.fleet), scenario.clock.physics_hz)
+        self._tampering = {v.sysid: Tampering(v.frame) for v in scenario.fleet}
         self._contact_log = ContactLog()
         self._samples = 0  # truth records made so far
 
@@ -47,6 +51,15 @@ class Simulation:
         ]
         return tuple((sysid, reply) for reply in again if reply is not None)
 
+    def obey(self, order: Break | Mend) -> None:
+        """From the next step on. Raises ValueError for a fault that can't be put in effect."""
+        match order:
+            case Break(fault):
+                injection = to_injection(fault.fault())
+            case Mend(fault):
+                injection = to_clearing(fault.fault().unit, fault.instances)
+        self._tampering[order.fault.vehicle].inject(injection, self.time_s)
+
     def may_step(self, until_s: float) -> bool:
         """Every vehicle has joined, nobody owes a frame, and a step more is not too far."""
         joined = not self.lockstep.absent() and self.lockstep.may_step()
@@ -57,7 +70,10 @@ class Simulation:
         truth = self._sample()
         contacts: list[ContactEpisode] = []
         target = min(self.lockstep.next_answer(), self._last_step(until_s))
-        outputs = self.lockstep.outputs()
+        outputs = {
+            sysid: self._tampering[sysid].outputs(pwm_us, self.time_s)
+            for sysid, pwm_us in self.lockstep.outputs().items()
+        }
         while self.world.steps < target:
             self.world.step(outputs)
             contacts += self._contact_log.add(self.time_s, self.world.contacts())
@@ -76,7 +92,7 @@ class Simulation:
     def _answer(self, now_s: float) -> tuple[Reply, ...]:
         replies = []
         for sysid in self.lockstep.answers_due(self.world.steps):
-            reply = encode_state(self.world.state(sysid))
+            reply = encode_state(self._tampering[sysid].told(self.world.state(sysid)))
             self.lockstep.answered(sysid, reply, now_s)
             replies.append((sysid, reply))
         return tuple(replies)

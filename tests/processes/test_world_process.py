@@ -10,7 +10,9 @@ import pytest
 from children import HIL, ROOT, Child, child, free_port_base
 from fake_vehicle import FakeVehicle
 
+from hil.scenario import FaultModel
 from hil.world.lockstep import SILENT_AFTER_S
+from hil.world.orders import Break, Mend, order_line
 
 SCENARIO = str(ROOT / "scenarios" / "rescue.yaml")
 FORWARD = (1900, 1900, 1500, 1500)
@@ -127,3 +129,31 @@ def test_a_busy_port_is_named(base: int) -> None:
             assert process.wait() == 2
     assert str(base + 10) in process.stderr()
     assert process.stderr().count("\n") == 1
+
+
+def test_faults_come_over_the_leash_and_end_there(base: int, vehicles: list[FakeVehicle]) -> None:
+    """Rover 1 without power does not move; with it again it does, the others all the time."""
+    fault = FaultModel(vehicle=1, unit="motor", type="off", applied_by="world")
+    with child(*world(base, "--speed", "0", "--leash", "--truth", "-")) as process:
+        process.wait_for("ready")
+        process.write(order_line(Break(fault)))
+        process.write("until 1")
+        drive(vehicles, until_s=1.0)
+        first = json.loads(process.wait_for('{"type":"truth","time_s":1.0,'))["vehicles"]
+        process.write(order_line(Mend(fault)))
+        process.write("until 2")
+        drive(vehicles, until_s=2.0)
+        second = json.loads(process.wait_for('{"type":"truth","time_s":2.0,'))["vehicles"]
+        process.close_stdin()
+        assert process.wait() == 0
+    assert first["1"][3] == 0.0
+    assert first["2"][3] > 0.3
+    assert second["1"][3] > 0.3
+
+
+def test_an_order_that_cannot_be_is_named(base: int) -> None:
+    with child(*world(base, "--leash")) as process:
+        process.wait_for("ready")
+        process.write('break {"vehicle": 1, "unit": "gps", "type": "off", "applied_by": "world"}')
+        assert process.wait() == 2
+    assert "the world can't apply gps off" in process.stderr()

@@ -58,7 +58,8 @@ def start(scenario: Scenario, learn: Learn) -> tuple[Rig, Heard, Iterator[float]
     """A rig whose faults strike as the scenario says; iterate to let time pass (s)."""
     heard = Heard()
     rig = Rig(scenario, blind_view(scenario), [heard], learn)
-    breaker, onsets = Breaker(scenario, lambda _: None), Onsets(scenario)
+    breaker = Breaker(scenario, lambda _: None, lambda _: None, rig.simulation.obey)
+    onsets = Onsets(scenario)
     breaker.strike(onsets.at_start())
 
     def inject() -> None:
@@ -73,6 +74,7 @@ def start(scenario: Scenario, learn: Learn) -> tuple[Rig, Heard, Iterator[float]
         for advance in rig.run():
             for record in advance.truth:
                 breaker.strike(onsets.due(record))
+                breaker.mend(onsets.over(record))
             inject()
             yield rig.time_s
 

@@ -37,7 +37,8 @@ class Wiretap(Silent):
 def _listen(scenario: Scenario, until_s: float) -> Wiretap:
     tap = Wiretap()
     rig = Rig(scenario, blind_view(scenario), [tap])
-    breaker, onsets = Breaker(scenario, lambda _: None), Onsets(scenario)
+    breaker = Breaker(scenario, lambda _: None, lambda _: None, rig.simulation.obey)
+    onsets = Onsets(scenario)
     breaker.strike(onsets.at_start())
 
     def inject() -> None:
@@ -86,6 +87,13 @@ def test_before_its_onset_a_fault_changes_no_byte() -> None:
     none = _listen(load_scenario(RESCUE, ["faults=[]"]), until_s=11.99)
     assert motor.heard == none.heard
     assert gps.heard == none.heard
+
+
+@pytest.mark.parametrize("path", [RESCUE, STUCK])
+def test_who_applies_a_fault_changes_no_byte(path: Path) -> None:
+    by_vehicle = _listen(load_scenario(path), until_s=10.0)
+    by_world = _listen(load_scenario(path, ["faults.0.applied_by=world"]), until_s=10.0)
+    assert by_world.heard == by_vehicle.heard
 
 
 def test_the_view_has_no_word_of_fault_truth_seed_or_name() -> None:

@@ -24,6 +24,23 @@ def test_a_push_tells_dead_motors_from_a_stuck_gps(name: str, hypothesis: str, s
     assert (verdict.sysid, verdict.hypothesis, verdict.decided) == (2, hypothesis, True)
 
 
+@pytest.mark.parametrize(
+    ("name", "hypothesis"), [("rescue", "motor_y_off"), ("stuck_gps", "gps_east_stuck")]
+)
+def test_who_applies_the_fault_is_the_same_to_the_station(name: str, hypothesis: str) -> None:
+    rig, _, times = start(_scenario(name, "faults.0.applied_by=world"), scripted(0.8))
+    run_until_ended(rig, times)
+    verdict = rig.node.station.desk.verdict
+    assert verdict is not None
+    assert (verdict.sysid, verdict.hypothesis, verdict.decided) == (2, hypothesis, True)
+
+
+def test_a_fault_that_ends_leaves_a_sound_vehicle() -> None:
+    rig, heard, times = start(_scenario("rescue", "faults.0.until_s=0.5"), scripted(0.0))
+    run_until_ended(rig, times)
+    assert heard.texts("anomaly") == []
+
+
 def test_a_manoeuvre_that_touches_nobody_decides_nothing_and_the_fleet_holds() -> None:
     rig, heard, times = start(_scenario("rescue"), scripted(-0.3, seconds=1.0))
     run_until_ended(rig, times)

@@ -23,6 +23,7 @@ from hil.mavlink import (
     Result,
 )
 from hil.scenario import FaultModel, Scenario
+from hil.world.orders import Break, Mend
 from hil.world.truth import TruthRecord, VehicleTruth
 
 STUCK = FaultModel(vehicle=2, unit="gps", type="stuck", axes=("east",))
@@ -48,8 +49,20 @@ def struck() -> list[FaultModel]:
 
 
 @pytest.fixture
-def breaker(struck: list[FaultModel]) -> Breaker:
-    return Breaker(rescue(), struck.append)
+def mended() -> list[FaultModel]:
+    return []
+
+
+@pytest.fixture
+def to_world() -> list[Break | Mend]:
+    return []
+
+
+@pytest.fixture
+def breaker(
+    struck: list[FaultModel], mended: list[FaultModel], to_world: list[Break | Mend]
+) -> Breaker:
+    return Breaker(rescue(), struck.append, mended.append, to_world.append)
 
 
 def test_nothing_asked_nothing_sent(breaker: Breaker) -> None:
@@ -86,6 +99,33 @@ def test_parameters_go_before_commands(breaker: Breaker, struck: list[FaultModel
     assert third.params[:3] == (4.0, 2.0, 0.0)
     breaker.step(0.2, 2, answer(ack()))
     assert struck == [STUCK]
+
+
+def test_a_fault_ends_when_its_clearing_is_confirmed(
+    breaker: Breaker, struck: list[FaultModel], mended: list[FaultModel]
+) -> None:
+    breaker.mend([STUCK])
+    breaker.step(0.0, 2, [])
+    (clearing,) = sent(breaker.step(0.0, 2, answer(ParamValue(GATE, 1.0, 0, 2))))
+    assert clearing.params[:3] == (4.0, 0.0, 0.0)
+    assert mended == []
+    breaker.step(0.1, 2, answer(ack()))
+    assert (struck, mended) == ([], [STUCK])
+
+
+def test_what_the_world_applies_goes_to_no_vehicle(
+    breaker: Breaker,
+    struck: list[FaultModel],
+    mended: list[FaultModel],
+    to_world: list[Break | Mend],
+) -> None:
+    fault = OFF.model_copy(update={"applied_by": "world"})
+    breaker.strike([fault])
+    assert (struck, mended, to_world) == ([fault], [], [Break(fault)])
+    breaker.mend([fault])
+    assert (mended, to_world) == ([fault], [Break(fault), Mend(fault)])
+    assert breaker.done
+    assert [breaker.step(0.0, sysid, []) for sysid in (1, 2, 3)] == [[], [], []]
 
 
 def test_a_fault_may_be_announced(breaker: Breaker) -> None:
@@ -173,6 +213,18 @@ def test_faults_strike_once_in_their_time() -> None:
     assert instances(onsets.due(truth(2.0))) == [2]
     assert instances(onsets.due(truth(2.1, north_m=1.6))) == [3]
     assert onsets.due(truth(9.0, north_m=9.0)) == ()
+
+
+def test_faults_end_in_their_time_if_they_ever_struck() -> None:
+    plain = scenario({"at_s": 0.0}, {"at_s": 2.0}, {"when": "rover_2.north_m > 1.5"})
+    faults = tuple(f.model_copy(update={"until_s": 3.0}) for f in plain.faults)
+    onsets = Onsets(plain.model_copy(update={"faults": faults}))
+    onsets.at_start()
+    assert instances(onsets.over(truth(2.9))) == []
+    assert instances(onsets.due(truth(2.9))) == [2]
+    assert instances(onsets.over(truth(3.0))) == [1, 2]
+    assert onsets.over(truth(3.1)) == ()
+    assert onsets.due(truth(3.1, north_m=9.0)) == ()
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,9 @@ import math
 
 import pytest
 
+from hil.errors import InputError
+from hil.scenario import FaultModel
+from hil.world.orders import Break, Mend, Order, OrderReader, Until, order_line, parse_order
 from hil.world.pacing import Leash, Pace
 from hil.world.truth import (
     Contact,
@@ -16,6 +19,7 @@ from hil.world.truth import (
     truth_line,
 )
 
+FAULT = FaultModel(vehicle=2, unit="motor", type="off", instances=(3,), applied_by="world")
 PAIR, WALL = ("a", "b"), ("a", "wall_north")
 HERE = (1.0, 2.0)
 
@@ -68,9 +72,26 @@ def test_speed_zero_never_waits() -> None:
     assert Pace(0.0).wait_s(math.inf, 0.0) == 0.0
 
 
-def test_leash_takes_whole_lines_and_never_shortens() -> None:
+def test_the_leash_never_shortens() -> None:
     leash = Leash(0.0)
-    leash.feed(b"until 1")
-    assert leash.until_s == 0.0
-    leash.feed(b".5\nuntil 1.0\nuntil x\nnonsense\n\xff\n")
+    for until_s in (1.5, 1.0, math.nan, -math.inf):
+        leash.lengthen(until_s)
     assert leash.until_s == 1.5
+
+
+def test_orders_come_in_whole_lines_and_what_is_none_is_passed_over() -> None:
+    reader = OrderReader()
+    assert reader.feed(b"until 1") == []
+    assert reader.feed(b".5\nuntil 1.0\nuntil x\nnonsense\n\xff\n") == [Until(1.5), Until(1.0)]
+
+
+@pytest.mark.parametrize("order", [Until(2.25), Break(FAULT), Mend(FAULT)])
+def test_orders_survive_the_way(order: Order) -> None:
+    assert parse_order(order_line(order)) == order
+
+
+def test_an_order_for_what_the_world_cannot_do_says_why() -> None:
+    with pytest.raises(InputError, match="the world can't apply gps noise; it can motor off"):
+        parse_order('break {"vehicle":1,"unit":"gps","type":"noise","size":1,"applied_by":"world"}')
+    with pytest.raises(InputError, match=r"order to the world: break \{: Invalid JSON"):
+        parse_order("break {")
