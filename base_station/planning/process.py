@@ -15,16 +15,19 @@ from typing import TextIO
 import numpy as np
 
 from base_station.hypotheses import candidates
+from base_station.planning.attempts import Attempts
 from base_station.planning.learning import ppo
 from base_station.planning.learning.lesson import Lesson
 from base_station.planning.learning.presets import TUNED_ALPHA
-from base_station.planning.planner import plan
+from base_station.planning.planner import in_turn, plan
 from base_station.planning.problems import alpha_problem
 from base_station.planning.requests import PlanRequest, decode, encode
+from base_station.planning.shelf import Shelf, default_folder
 from base_station.planning.tasks.alpha import AlphaTask
 from base_station.planning.tasks.candidates import best_candidate
+from base_station.planning.team import Team, team_size
 from base_station.twin import FleetModel, initial_state
-from hil.errors import InputError
+from hil.errors import HilError, InputError
 from hil.scenario import StationView, load_station_view
 
 READY = "ready"
@@ -32,13 +35,26 @@ LOG = logging.getLogger("planner")
 
 
 def serve(view: StationView, lines: TextIO, out: TextIO) -> None:
-    """Answer requests until the input ends; a line that is no request is logged and skipped."""
+    """Answer requests until the input ends; a line that is no request is logged and skipped.
+
+    `ready` is said when everything that learns is warm: this process, or its workers.
+    """
+    size = team_size(view.planning.workers)
+    if size == 1:
+        warm_up(view)
+        _serve(view, lines, out, in_turn)
+    else:
+        with Team(view, size, warm_up) as team:
+            _serve(view, lines, out, team)
+
+
+def _serve(view: StationView, lines: TextIO, out: TextIO, attempts: Attempts) -> None:
+    shelf = Shelf(default_folder()) if view.planning.reuse else None
 
     def say(text: str) -> None:
         out.write(text + "\n")
         out.flush()
 
-    warm_up(view)
     say(READY)
     for line in lines:
         try:
@@ -50,9 +66,14 @@ def serve(view: StationView, lines: TextIO, out: TextIO) -> None:
             LOG.error("ignored a %s; only requests come in", type(request).__name__)
             continue
         LOG.info("request %d: plan %s", request.number, request.kind)
-        ready = plan(view, request, lambda progress: say(encode(progress)))
+        ready = shelf.find(view, request) if shelf else None
+        if ready is None:
+            ready = plan(view, request, lambda progress: say(encode(progress)), attempts)
+            if shelf:
+                shelf.keep(view, request, ready)
         say(encode(ready))
-        LOG.info("request %d: %d trainings", request.number, len(ready.trainings))
+        how = "reused" if ready.reused else "new"
+        LOG.info("request %d: %d trainings, %s", request.number, len(ready.trainings), how)
 
 
 def warm_up(view: StationView) -> None:
@@ -95,7 +116,7 @@ def main(arguments: list[str]) -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the station's; it then ends the input
     try:
         serve(load_station_view(Path(arguments[0])), sys.stdin, sys.stdout)
-    except InputError as error:
+    except HilError as error:
         print(error, file=sys.stderr)
         return error.exit_code
     except BrokenPipeError:

@@ -87,13 +87,17 @@ class Training:
 
 @dataclass(frozen=True)
 class PlanReady:
-    """The answer to a PlanRequest. Both plans are None when every restart missed its target."""
+    """The answer to a PlanRequest. Both plans are None when every restart missed its target.
+
+    `reused`: it was learned before, from the same; `trainings` are those of then.
+    """
 
     number: int
     kind: Kind
     trainings: tuple[Training, ...]
     plan: OpenLoopPlan | None = None
     policy: PolicyWeights | None = None
+    reused: bool = False
 
 
 Message = PlanRequest | PlanProgress | PlanReady

@@ -29,7 +29,8 @@ class Diagnosis(Model):
 
 class Planning(Model):
     """`planner` finds the experiment; the mission is always learned. `exploration` is how qtable
-    and dqn choose commands."""
+    and dqn choose commands; `workers` try side by side, 0: one for each core but one; `reuse` looks
+    for a plan that was learned before from the very same."""
 
     planner: Literal[
         "ppo", "ppo_lstm", "qtable", "dqn", "cem", "shooting", "random", "gradient", "ram"
@@ -41,6 +42,8 @@ class Planning(Model):
     alpha_horizon_s: Horizon = 8.0
     beta_horizon_s: Horizon = 40.0
     restarts: Annotated[int, Field(ge=0, le=100)] = 20
+    workers: Annotated[int, Field(ge=0, le=64)] = 0
+    reuse: bool = True
     planning_sim_s: NonNegative = 2.0
 
 
