@@ -121,7 +121,8 @@ def to_local(
 def to_target(setpoint: LocalSetpoint, estimate: Estimate, now_s: float) -> Target | None:
     """The target of a set-point in any of the four local frames; None for what can't be meant.
 
-    As in ArduPilot Rover a position excludes a velocity. Vertical fields are for what flies.
+    As in ArduPilot Rover a position excludes a velocity. Vertical fields are for what flies. A
+    position in BODY_NED counts from the vehicle, as ArduPilot has it; MAVLink says from the origin.
     """
     if setpoint.frame not in tuple(Frame) or _absurd(setpoint):
         return None
@@ -131,10 +132,9 @@ def to_target(setpoint: LocalSetpoint, estimate: Estimate, now_s: float) -> Targ
         yaw_rad = wrap_pi(yaw_rad + (estimate.yaw_rad if in_body else 0.0))
     if setpoint.position_m is not None:
         north, east = _turned(setpoint.position_m, estimate, in_body)
+        down: float | None = setpoint.position_m[2]
         if setpoint.frame != Frame.LOCAL_NED:
             north, east = north + estimate.position_m[0], east + estimate.position_m[1]
-        down: float | None = setpoint.position_m[2]
-        if setpoint.frame not in (Frame.LOCAL_NED, Frame.BODY_NED):
             down = setpoint.position_m[2] + estimate.position_m[2]
         if setpoint.type_mask & TypeMask.Z:
             down = None

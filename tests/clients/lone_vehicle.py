@@ -51,12 +51,14 @@ def lone_vehicle(
     vehicle += ["--listen-port", str(ports.listen), "--injector-port", str(ports.injector)]
     vehicle += options
     with ExitStack() as stack:
-        for words in ([*world, "--speed", str(speed)], vehicle):
-            process = subprocess.Popen(
-                [sys.executable, "-m", *words], stdout=subprocess.PIPE, text=True
-            )
+        processes = [
+            subprocess.Popen([sys.executable, "-m", *words], stdout=subprocess.PIPE, text=True)
+            for words in ([*world, "--speed", str(speed)], vehicle)
+        ]
+        for process in processes:
             stack.callback(process.communicate)
             stack.callback(process.kill)
+        for process in processes:
             assert process.stdout is not None
             assert process.stdout.readline() == "ready\n"
         yield ports

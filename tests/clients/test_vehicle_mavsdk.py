@@ -1,52 +1,36 @@
-"""MAVSDK, as a process of its own, against a vehicle in the real world process."""
+"""MAVSDK, as a process of its own, against a rover in the real world process."""
 
 import asyncio
 import logging
-import socket
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+import math
 from pathlib import Path
 from typing import Any
 
 import pytest
-from lone_vehicle import PATIENCE_S, SYSID, Ports, lone_vehicle
+from lone_vehicle import Ports, lone_vehicle
+from mavsdk_client import (
+    NORTH_DEG,
+    armed_with_a_text,
+    by_hand,
+    connected,
+    failures,
+    first,
+    geofence,
+    mavsdk,
+    parameters,
+    rates,
+    set_mode,
+    telemetry,
+    troubles,
+)
 
 from hil.airframe import OMNI_PLUS, OMNI_X, SKID_STEER, Airframe
-from hil.mavlink import Encoder
+from hil.mavlink import RoverMode
 
-mavsdk = pytest.importorskip("mavsdk_grpc")
 pytestmark = pytest.mark.filterwarnings("ignore")  # the client's own are not ours to judge
 
 SPEED = 3.0
-NORTH_DEG = 1.0 / 111_319.5  # of a metre
 WAY_POINT, GLOBAL_RELATIVE_INT, MISSION = 16, 6, 0
-
-
-def free_tcp_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
-async def first(stream: AsyncIterator[Any], wanted: Callable[[Any], bool] = lambda _: True) -> Any:
-    async def search() -> Any:
-        async for value in stream:
-            if wanted(value):
-                return value
-        raise AssertionError("the stream ended")
-
-    return await asyncio.wait_for(search(), PATIENCE_S)
-
-
-@asynccontextmanager
-async def connected(address: str) -> AsyncIterator[Any]:
-    system = mavsdk.System(port=free_tcp_port())
-    try:
-        await system.connect(address)
-        await first(system.core.connection_state(), lambda state: state.is_connected)
-        yield system
-    finally:
-        system._stop_mavsdk_server()
 
 
 async def reaches(rover: Any, north_m: float, east_m: float) -> None:
@@ -63,41 +47,6 @@ async def moves(rover: Any, north_mps: float, east_mps: float) -> None:
         return bool(north * north + east * east < 0.15**2)
 
     await first(rover.telemetry.position_velocity_ned(), does)
-
-
-async def telemetry(rover: Any, full_v: float) -> None:
-    await first(rover.telemetry.health(), lambda h: h.is_local_position_ok and h.is_armable)
-    assert (await first(rover.telemetry.home())).absolute_altitude_m == pytest.approx(488, abs=0.3)
-    assert (await first(rover.telemetry.gps_info())).num_satellites == 18
-    assert (await first(rover.telemetry.battery())).voltage_v == pytest.approx(full_v, abs=0.3)
-    assert not await first(rover.telemetry.in_air())
-    await rover.telemetry.set_rate_position_velocity_ned(20.0)
-    await rover.telemetry.set_rate_scaled_imu(10.0)
-    imu = await first(rover.telemetry.scaled_imu())
-    assert abs(imu.acceleration_frd.forward_m_s2) < abs(imu.acceleration_frd.down_m_s2)
-    assert (await rover.info.get_version()).flight_sw_major == 4
-
-
-async def parameters(rover: Any) -> None:
-    await rover.param.set_param_float("FS_TIMEOUT", 6.0)
-    assert await rover.param.get_param_float("FS_TIMEOUT") == 6.0
-    await rover.param.set_param_int("FENCE_ACTION", 1)
-    assert await rover.param.get_param_int("FENCE_ACTION") == 1
-    everything = await rover.param.get_all_params()
-    assert "WP_SPEED" in {p.name for p in everything.float_params}
-    with pytest.raises(mavsdk.param.ParamError):
-        await rover.param.get_param_float("SIM_GPS1_NOISE")
-
-
-async def armed_with_a_text(rover: Any) -> None:
-    """Nobody tells when a subscription has begun, so arm until a text has come through it."""
-    texts = first(rover.telemetry.status_text(), lambda t: t.text == "Throttle armed")
-    heard = asyncio.ensure_future(texts)
-    while not heard.done():
-        await rover.action.disarm()
-        await rover.action.arm()
-        await asyncio.wait({heard}, timeout=1.0)
-    assert heard.result().text == "Throttle armed"
 
 
 async def guided(rover: Any, sideways: bool) -> None:
@@ -150,39 +99,29 @@ async def mission(rover: Any) -> None:
     await reaches(rover, 0.0, 0.0)
 
 
-async def failures(rover: Any, ports: Ports) -> None:
-    """On the station's port it does not exist; on the injector's it works, behind its gate."""
-    unit, kind = mavsdk.failure.FailureUnit, mavsdk.failure.FailureType
-    with pytest.raises(mavsdk.failure.FailureError, match="UNSUPPORTED"):
-        await rover.failure.inject(unit.SYSTEM_MOTOR, kind.OFF, 1)
-    async with connected(f"udpout://127.0.0.1:{ports.injector}") as injector:
-        await injections(rover, injector, ports)
+async def driven_by_hand(rover: Any, ports: Ports) -> None:
+    """A joystick in MANUAL; z is the throttle."""
+    set_mode(ports, RoverMode.MANUAL)
+    await first(rover.telemetry.flight_mode(), lambda m: m.name == "MANUAL")
+    seen = rover.telemetry.velocity_ned()
+    await by_hand(rover, (0.0, 0.0, 0.6, 0.0), first(seen, lambda v: speed(v) > 0.3))
+    await rover.action.hold()
 
 
-async def injections(rover: Any, injector: Any, ports: Ports) -> None:
-    unit, kind = mavsdk.failure.FailureUnit, mavsdk.failure.FailureType
-    with pytest.raises(mavsdk.failure.FailureError, match="DENIED"):
-        await injector.failure.inject(unit.SYSTEM_MOTOR, kind.OFF, 1)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
-        gate = Encoder(251, 190).param_set(SYSID, "SYS_FAILURE_EN", 1.0)
-        sock.settimeout(PATIENCE_S)
-        sock.sendto(gate, ("127.0.0.1", ports.injector))
-        sock.recv(300)
-    await injector.failure.inject(unit.SYSTEM_MOTOR, kind.OFF, 0)
-    await injector.failure.inject(unit.SENSOR_GPS, kind.OFF, 0)
-    await first(rover.telemetry.gps_info(), lambda g: g.fix_type.value <= 1)
-    await injector.failure.inject(unit.SYSTEM_MOTOR, kind.OK, 0)
-    await injector.failure.inject(unit.SENSOR_GPS, kind.OK, 0)
-    await first(rover.telemetry.gps_info(), lambda g: g.fix_type.value > 1)
+def speed(velocity: Any) -> float:
+    return math.hypot(velocity.north_m_s, velocity.east_m_s)
 
 
 async def everything(ports: Ports, airframe: Airframe) -> None:
     async with connected(f"udpin://127.0.0.1:{ports.mavlink}") as rover:
         await telemetry(rover, airframe.battery.full_v)
         await parameters(rover)
+        await rates(rover)
+        await geofence(rover)
         await guided(rover, airframe.steering == "omni")
         await goto(rover)
         await mission(rover)
+        await driven_by_hand(rover, ports)
         await rover.action.disarm()
         await first(rover.telemetry.armed(), lambda armed: not armed)
         await failures(rover, ports)
@@ -194,6 +133,4 @@ def test_mavsdk_and_a_rover(
 ) -> None:
     with caplog.at_level(logging.DEBUG), lone_vehicle(tmp_path, airframe.name, SPEED) as ports:
         asyncio.run(everything(ports, airframe))
-    told = [(r.levelname, r.getMessage()) for r in caplog.records]
-    assert told
-    assert [t for t in told if t[0] in ("WARNING", "ERROR") or "imeout" in t[1]] == []
+    assert troubles(caplog.records) == []

@@ -235,6 +235,17 @@ def test_a_point_waits_until_the_take_off_is_done() -> None:
     until(world, lambda: is_at(world, 2.0, 0.0, 1.0))
 
 
+@pytest.mark.parametrize(("frame", "height_m"), [(1, 1.0), (7, 4.0), (8, 4.0), (9, 4.0)])
+def test_only_local_ned_counts_heights_from_the_origin(
+    quad: InWorld, frame: int, height_m: float
+) -> None:
+    up = LocalSetpoint(1, 1, 0.0, frame, POSITION_ALONE, (0.0, 0.0, -1.0), None, None, None)
+    quad.tell(quad.station.encode(up))
+    until(quad, lambda: is_at(quad, 0.0, 0.0, height_m), 15.0)
+    quad.run(3.0)
+    assert is_at(quad, 0.0, 0.0, height_m)
+
+
 def test_in_the_air_there_is_no_second_take_off(quad: InWorld) -> None:
     assert ordered(quad, Command.NAV_TAKEOFF, 0, 0, 0, NAN, 0, 0, 6.0) == Result.FAILED
     quad.run(3.0)
