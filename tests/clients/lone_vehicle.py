@@ -1,6 +1,7 @@
 """A world with one vehicle in it, as processes; and how to watch what clients say."""
 
 import queue
+import re
 import subprocess
 import sys
 import threading
@@ -91,8 +92,8 @@ class Console:
         self.process.stdin.write(line + "\n")
         self.process.stdin.flush()
 
-    def expect(self, words: str, again: str | None = None) -> str:
-        """Wait for a line with these words; `again` is told anew each half second until then."""
+    def expect(self, pattern: str, again: str | None = None) -> str:
+        """Wait for a line that the pattern is found in; `again` is told each half second."""
         end_s = time.monotonic() + PATIENCE_S
         tell_s = time.monotonic() if again else end_s
         while (now_s := time.monotonic()) < end_s:
@@ -104,9 +105,9 @@ class Console:
             except queue.Empty:
                 continue
             self.said.append(line)
-            if words in line:
+            if re.search(pattern, line):
                 return line
-        raise AssertionError(f"no {words!r} after:\n" + "\n".join(self.said))
+        raise AssertionError(f"no {pattern!r} after:\n" + "\n".join(self.said))
 
     def stop(self) -> None:
         self.process.kill()
