@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from base_station.autopilots import Autopilot
-from hil.mavlink import Encoder
+from hil.mavlink import Encoder, MessageId
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,33 @@ class AskTime:
     ts1_ns: int
 
 
-Command = Arm | SetMode | Drive | Heartbeat | AskTime
+@dataclass(frozen=True)
+class AskRate:
+    """MAV_CMD_SET_MESSAGE_INTERVAL."""
+
+    sysid: int
+    message: MessageId
+    hz: float
+
+
+@dataclass(frozen=True)
+class RequestMessage:
+    """MAV_CMD_REQUEST_MESSAGE."""
+
+    sysid: int
+    message: MessageId
+
+
+@dataclass(frozen=True)
+class SetParameter:
+    """PARAM_SET; the vehicle says what it has then."""
+
+    sysid: int
+    name: str
+    value: float
+
+
+Command = AskRate | RequestMessage | SetParameter | Arm | SetMode | Drive | Heartbeat | AskTime
 
 
 def encode(command: Command, encoder: Encoder, autopilot: Autopilot) -> bytes:
@@ -57,5 +83,11 @@ def encode(command: Command, encoder: Encoder, autopilot: Autopilot) -> bytes:
             return autopilot.velocity(encoder, sysid, time_s, north_mps, east_mps, yaw_rad)
         case Heartbeat():
             return encoder.gcs_heartbeat()
+        case AskRate(sysid, message, hz):
+            return encoder.set_message_interval(sysid, message, hz)
+        case RequestMessage(sysid, message):
+            return encoder.request_message(sysid, message)
+        case SetParameter(sysid, name, value):
+            return autopilot.set_parameter(encoder, sysid, name, value)
         case AskTime(_, ts1_ns):
             return encoder.timesync(0, ts1_ns)

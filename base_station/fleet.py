@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from base_station.autopilots import adapter
 from base_station.fleet_clock import FleetClock
+from base_station.local_origin import LocalOrigin
 from base_station.telemetry import Frame, Sample, Track, frame_at, note
 from hil import mavlink
 from hil.scenario import StationView
@@ -20,6 +21,10 @@ class Fleet:
         self.tracks = [Track() for _ in view.fleet]
         self._clock = FleetClock(tuple(m.sysid for m in view.fleet))
         self._autopilots = [adapter(m.autopilot, m.frame) for m in view.fleet]
+        self._origins = [
+            LocalOrigin(view.origin.origin()) if a.has_own_origin else None
+            for a in self._autopilots
+        ]
         self._next_tick = 0  # in ticks of 1 / telemetry_hz of fleet time
 
     @property
@@ -34,9 +39,13 @@ class Fleet:
         track.last_heard_wall_s = wall_s
         value = message.value
         track.status = note(track.status, value, len(member.frame.motors))
-        if isinstance(value, mavlink.LocalPosition):
+        origin = self._origins[index]
+        if origin is not None:
+            origin.hear(value)
+        offset_m = (0.0, 0.0) if origin is None else origin.offset_m
+        if isinstance(value, mavlink.LocalPosition) and offset_m is not None:
             time_s = self._clock.fleet_time_s(member.sysid, value.time_s)
-            north, east, _ = value.position_m
+            north, east = (value.position_m[k] + offset_m[k] for k in (0, 1))
             v_north, v_east, _ = value.velocity_mps
             track.position(Sample(time_s, (north, east), (v_north, v_east)))
         elif isinstance(value, mavlink.Timesync) and value.tc1_ns:

@@ -23,8 +23,8 @@ from base_station.planner_child import PlannerChild
 from base_station.recording.streams import VIEWER
 from base_station.telemetry import Frame
 from base_station.watch import Baseline, Watch
+from base_station.wiring import open_links
 from hil.errors import HilError, InputError
-from hil.link import UdpLink
 from hil.options import Parser
 from hil.scenario import StationView, load_station_view
 
@@ -52,7 +52,12 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
         prog="base-station",
         description="Find out what is broken in a fleet, over MAVLink, and finish its mission.",
     )
-    parser.add_argument("view", type=Path, help="as `hil station-view SCENARIO` prints it")
+    parser.add_argument(
+        "view",
+        type=Path,
+        metavar="FLEET",
+        help="a fleet file, or what `hil station-view SCENARIO` prints",
+    )
     parser.add_argument("--out", type=Path, default=Path("."), help="where logs are written")
     parser.add_argument("--machine", action="store_true", help="JSON lines instead of text")
     parser.add_argument(
@@ -76,9 +81,7 @@ def run(arguments: argparse.Namespace) -> None:
     say = _say_json if arguments.machine else _say_text
     run_id = arguments.run_id or f"station-{os.getpid()}"
     with ExitStack() as stack:
-        links = [_bind(view, member.mavlink_port) for member in view.fleet]
-        for link in links:
-            stack.callback(link.close)
+        links = open_links(stack, view)
         _make_folder(arguments.out)
         planner = PlannerChild(arguments.view, arguments.out / "planner.log")
         stack.callback(planner.close)
@@ -89,16 +92,6 @@ def run(arguments: argparse.Namespace) -> None:
         while not node.finished:
             select.select([*(link.fileno() for link in links), planner.fileno()], [], [], STEP_S)
             node.step(time.monotonic(), time.time_ns() // 1000)
-
-
-def _bind(view: StationView, port: int) -> UdpLink:
-    try:
-        return UdpLink.bind(view.host, port)
-    except OSError as error:
-        raise InputError(
-            f"port {view.host}:{port} (host, mavlink_port): {error.strerror}; "
-            "stop who uses it, or change the view"
-        ) from None
 
 
 def _make_folder(out: Path) -> None:

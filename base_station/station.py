@@ -27,6 +27,7 @@ from base_station.phases import (
     Settling,
 )
 from base_station.planning.requests import PlanReady, PlanRequest
+from base_station.preparing import Preparation
 from base_station.records import Event, Snapshot
 from base_station.snapshots import snapshot
 from base_station.steps.diagnosing import await_alpha, conclude, experiment, settle
@@ -65,6 +66,10 @@ class Station:
         self._decide = decide or own_decision
         self._commander = Commander(view)
         self.autopilots = self._commander.autopilots
+        self._preparations = [
+            Preparation(m, a, view.clock.telemetry_hz, view.station_sysid)
+            for m, a in zip(view.fleet, self.autopilots, strict=True)
+        ]
         self._touched_s: dict[tuple[int, int], float] = {}
         self._beats_s = (float("-inf"), float("-inf"))  # last heartbeat: wall, fleet
         self._asked_time_s = float("-inf")
@@ -90,14 +95,27 @@ class Station:
         self._mind_the_links(wall_s)
         commands += self._keep_alive(wall_s)
         if isinstance(desk.phase, Connecting | Arming):
-            commands += get_ready(desk, self._commander)
+            commands += self._prepare(wall_s)
+            if all(p.done for p in self._preparations):
+                commands += get_ready(desk, self._commander)
         for frame in desk.fleet.due() if desk.watching else ():
             commands += self._tick(frame)
             snapshots.append(snapshot(desk, frame))
         return Outputs(tuple(commands), desk.take_request(), desk.take_events(), tuple(snapshots))
 
+    def _prepare(self, wall_s: float) -> list[Command]:
+        commands: list[Command] = []
+        for preparation in self._preparations:
+            commands += preparation.asks(wall_s)
+            for warning in preparation.warnings():
+                self.desk.say("link", warning)
+        return commands
+
     def _note(self, index: int, message: mavlink.Received) -> None:
         desk, member = self.desk, self.desk.view.fleet[index]
+        if message.sysid != member.sysid:
+            return
+        self._preparations[index].hear(message.value)
         match message.value:
             case mavlink.CommandAck(command=mavlink.Command.DO_SET_MODE, result=0):
                 asked = self._commander.mode_asked(index)
@@ -112,13 +130,13 @@ class Station:
 
     def _keep_alive(self, wall_s: float) -> list[Command]:
         commands: list[Command] = []
-        fleet, fleet_s = self.desk.view.fleet, self.desk.time_s
+        firsts, fleet_s = self.desk.view.first_on_each_link, self.desk.time_s
         if max(wall_s - self._beats_s[0], fleet_s - self._beats_s[1]) >= HEARTBEAT_S:
             self._beats_s = (wall_s, fleet_s)
-            commands += [Heartbeat(m.sysid) for m in fleet]
+            commands += [Heartbeat(m.sysid) for m in firsts]
         if wall_s - self._asked_time_s >= TIMESYNC_S:
             self._asked_time_s = wall_s
-            commands += [AskTime(m.sysid, int(wall_s * 1e9)) for m in fleet]
+            commands += [AskTime(m.sysid, int(wall_s * 1e9)) for m in firsts]
         return commands
 
     def _tick(self, frame: Frame) -> list[Command]:

@@ -146,3 +146,9 @@ class Framer:
         checksum = mcrf4xx(body + layout.crc_extra)
         frame = b"\xfd" + body + checksum.to_bytes(2, "little")
         return self._signing.sign(frame) if self._signing else frame
+
+
+def crc_extra_of(number: int) -> bytes | None:
+    """The seed that a message's checksum ends with; None for a message not known."""
+    layout = _LAYOUTS.get(number)
+    return None if layout is None else layout.crc_extra

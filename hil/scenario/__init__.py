@@ -6,6 +6,7 @@ Units are in the field names; positions are local NED metres from `origin`.
 
 from hil.scenario.faults import FaultModel, Onset
 from hil.scenario.fields import PORTS_PER_VEHICLE
+from hil.scenario.fleetfile import FleetFile, FleetVehicle
 from hil.scenario.loading import MAX_FILE_BYTES, load_scenario, load_station_view
 from hil.scenario.mission import (
     MIN_PUSH_MARGIN,
@@ -19,7 +20,7 @@ from hil.scenario.mission import (
 )
 from hil.scenario.places import Arena, Clock, OriginModel, Patch, Point, Slope, Terrain, Wind
 from hil.scenario.schema import Scenario
-from hil.scenario.station import STATION_AIRFRAMES, FleetMember, StationView, station_view
+from hil.scenario.station import STATION_AIRFRAMES, FleetMember, Safety, StationView, station_view
 from hil.scenario.vehicles import Plant, Radio, Sensors, Vehicle
 
 __all__ = [
@@ -32,7 +33,9 @@ __all__ = [
     "Diagnosis",
     "Expectation",
     "FaultModel",
+    "FleetFile",
     "FleetMember",
+    "FleetVehicle",
     "GoalOutcome",
     "Limits",
     "Links",
@@ -44,6 +47,7 @@ __all__ = [
     "Point",
     "Priors",
     "Radio",
+    "Safety",
     "Scenario",
     "Sensors",
     "Slope",

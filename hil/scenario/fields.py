@@ -5,6 +5,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 from hil import airframe as airframes
+from hil.connection import parse_connection
 
 MAX_PORT = 65_000
 PORTS_PER_VEHICLE = 10
@@ -20,6 +21,14 @@ Metres = Annotated[float, Field(ge=-100_000, le=100_000)]  # the earth is flat w
 Horizon = Annotated[float, Field(gt=0, le=600)]
 Seed = Annotated[int, Field(ge=0, le=2**31 - 1)]
 AutopilotName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]  # a known one: station
+
+
+def _speakable(text: str) -> str:
+    parse_connection(text)
+    return text
+
+
+ConnectionText = Annotated[str, AfterValidator(_speakable)]
 VehicleName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
 Share = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)]
 Seconds = Annotated[float, Field(ge=0, le=60)]

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from hil.errors import InputError
 from hil.scenario.fields import Model
+from hil.scenario.fleetfile import FleetFile, is_fleet_file
 from hil.scenario.schema import Scenario
 from hil.scenario.station import StationView
 
@@ -28,8 +29,11 @@ def load_scenario(path: Path, overrides: Sequence[str] = ()) -> Scenario:
 
 
 def load_station_view(path: Path) -> StationView:
-    """Read a station view. Raises InputError."""
-    return _validated(StationView, path, _read_map(path))
+    """Read a station view, or a fleet file as one. Raises InputError."""
+    tree = _read_map(path)
+    if is_fleet_file(tree):
+        return _validated(FleetFile, path, tree).view()
+    return _validated(StationView, path, tree)
 
 
 def _validated(model: type[M], path: Path, tree: dict[str, Any]) -> M:

@@ -6,15 +6,19 @@ from pydantic import AfterValidator, Field, model_validator
 
 from hil import airframe as airframes
 from hil.airframe import Airframe
+from hil.connection import Connection, parse_connection
 from hil.errors import InputError
 from hil.scenario.checks import keep_inside, unique
 from hil.scenario.fields import (
     PORTS_PER_VEHICLE,
     AutopilotName,
+    ConnectionText,
     Finite,
     GroundSysId,
     Model,
+    NonNegative,
     Port,
+    Positive,
     Seed,
     SysId,
     VehicleName,
@@ -43,11 +47,27 @@ class FleetMember(Model):
     autopilot: AutopilotName = "testbed"
     start_yaw_deg: Finite
     goal: Point
-    mavlink_port: Port
+    mavlink_port: Port | None = None  # udpin on the view's host
+    connection: ConnectionText | None = None
+
+    @model_validator(mode="after")
+    def _can_be_spoken_to(self) -> Self:
+        if (self.mavlink_port is None) == (self.connection is None):
+            raise ValueError(f"{self.name} needs exactly one of connection and mavlink_port")
+        return self
 
     @property
     def frame(self) -> Airframe:
         return airframes.AIRFRAMES[self.airframe]
+
+
+class Safety(Model):
+    """What keeps people and machines whole, where vehicles are real."""
+
+    allow_contact: bool
+    contact_speed_mps: Positive = 0.3  # approaching another vehicle, where contact is allowed
+    contact_impulse_ns: Positive = 10.0  # mass times speed at a contact
+    fence_margin_m: NonNegative = 0.5  # inside the arena, where a vehicle is stopped
 
 
 class StationView(Model):
@@ -62,6 +82,7 @@ class StationView(Model):
     diagnosis: Diagnosis
     planning: Planning
     limits: Limits
+    safety: Safety | None = None  # None: a simulation, where nothing can be hurt
     host: str
     station_sysid: GroundSysId
     station_seed: Seed
@@ -71,11 +92,27 @@ class StationView(Model):
         sysids = [m.sysid for m in self.fleet]
         unique("fleet.sysid", sysids)
         unique("fleet.name", [m.name for m in self.fleet])
-        unique("fleet.mavlink_port", [m.mavlink_port for m in self.fleet])
+        ports = [m.mavlink_port for m in self.fleet if m.mavlink_port is not None]
+        unique("fleet.mavlink_port", ports)
         if self.station_sysid in sysids:
             raise ValueError(f"station_sysid = {self.station_sysid} is also a vehicle's")
         keep_inside(self.arena, "goal", self.fleet)
         return self
+
+    def connection_of(self, member: FleetMember) -> Connection:
+        """Where a member is spoken to."""
+        if member.connection is not None:
+            return parse_connection(member.connection)
+        assert member.mavlink_port is not None
+        return Connection("udpin", self.host, member.mavlink_port)
+
+    @property
+    def first_on_each_link(self) -> tuple[FleetMember, ...]:
+        """One member for each connection: the others there hear what is for all."""
+        firsts: dict[Connection, FleetMember] = {}
+        for member in self.fleet:
+            firsts.setdefault(self.connection_of(member), member)
+        return tuple(firsts.values())
 
 
 def station_view(scenario: Scenario, mavlink_port_base: int, station_seed: int) -> StationView:

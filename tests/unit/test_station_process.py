@@ -54,7 +54,7 @@ def test_bad_views(
 
 
 def test_bad_options(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "required: view" in refused(capsys)
+    assert "required: FLEET" in refused(capsys)
     assert "--colour" in refused(capsys, "view.json", "--colour")
 
 

@@ -1,0 +1,70 @@
+"""Fleet files: real vehicles, or simulators started by hand, for `base-station FLEET`."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from hil.scenario.fields import (
+    AirframeName,
+    AutopilotName,
+    ConnectionText,
+    GroundSysId,
+    Model,
+    Seed,
+    SysId,
+    VehicleName,
+)
+from hil.scenario.mission import Diagnosis, Limits, Planning
+from hil.scenario.places import Arena, Clock, OriginModel, Point
+from hil.scenario.station import FleetMember, Safety, StationView
+from hil.scenario.vehicles import Sensors
+
+
+class FleetVehicle(Model):
+    """A vehicle and how it is spoken to. Vehicles may share a connection: system ids differ."""
+
+    name: VehicleName
+    sysid: SysId
+    connection: ConnectionText
+    airframe: AirframeName
+    autopilot: AutopilotName
+    goal: Point
+
+
+class FleetFile(Model):
+    """All that a station needs to drive what is there. `arena` is the fence, from `origin`."""
+
+    origin: OriginModel
+    arena: Arena
+    fleet: Annotated[tuple[FleetVehicle, ...], Field(min_length=1, max_length=100)]
+    safety: Safety
+    yaw: Literal["locked", "free"] = "free"
+    clock: Clock = Clock(telemetry_hz=10)
+    sensors: Sensors = Sensors()
+    diagnosis: Diagnosis = Diagnosis()
+    planning: Planning = Planning()
+    limits: Limits = Limits()
+    station_sysid: GroundSysId = 250
+    station_seed: Seed = 0
+
+    @model_validator(mode="after")
+    def _is_a_view(self) -> Self:
+        self.view()
+        return self
+
+    def view(self) -> StationView:
+        """The same, as the station knows it."""
+        tree: dict[str, Any] = self.model_dump(exclude={"fleet"})
+        members = tuple(FleetMember(**v.model_dump(), start_yaw_deg=0.0) for v in self.fleet)
+        return StationView(**tree, fleet=members, host="127.0.0.1")
+
+
+def is_fleet_file(tree: dict[str, Any]) -> bool:
+    """Whether a map is meant as a fleet file; a station view carries ports and a host."""
+    return "host" not in tree and "name" not in tree
+
+
+def fleet_path(path: Path) -> Path:
+    """Where the fit of `hil identify` to a fleet file lies: beside it."""
+    return path.with_suffix(".identified.yaml")
