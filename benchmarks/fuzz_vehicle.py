@@ -18,7 +18,7 @@ from pathlib import Path
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import ardupilotmega
 
-from hil.mavlink import Decoder, Encoder, MessageId
+from hil.mavlink import Command, CopterMode, Decoder, Encoder, MessageId, RoverMode
 from hil.physics_link import AT_REST_MPS2, PhysicsState
 from hil.scenario import load_scenario
 from sim_vehicles.vehicle import PortName, Vehicle
@@ -30,6 +30,8 @@ LAYOUTS = {n: m for n, m in ardupilotmega.mavlink_map.items() if n < 2**24}
 OURS = [int(m) for m in MessageId]
 ODD_FLOATS = [math.nan, math.inf, -math.inf, 1e30, -3e38, 1e-45, 0.0, -0.0]
 ZERO = (0.0, 0.0, 0.0)
+AIRFRAMES = ("omni_plus", "skid_steer", "quad_x")
+HEIGHT_M = 3.0
 
 
 def payload(rng: random.Random, size: int) -> bytes:
@@ -103,19 +105,27 @@ def broken(rng: random.Random, data: bytes) -> bytes:
 
 
 class Subject:
-    """A vehicle that stands, with the time it lives in."""
+    """A vehicle that stands, or hangs in the air, armed and in GUIDED; and its time."""
 
-    def __init__(self, seed: int) -> None:
-        self.vehicle = Vehicle(load_scenario(SCENARIO, [f"seed={seed}"]), SYSID)
-        self.ticks = 0
+    def __init__(self, seed: int, airframe: str) -> None:
+        overrides = [f"seed={seed}", "yaw=free", "faults=[]", f"fleet.1.airframe={airframe}"]
+        self.vehicle = Vehicle(load_scenario(SCENARIO, overrides), SYSID)
+        self.ticks, self.down_m = 0, 0.0
         for _ in range(75):
             self.step()
+        flies = airframe == "quad_x"
+        mode = CopterMode.GUIDED if flies else RoverMode.GUIDED
+        self.vehicle.receive("gcs", STATION.set_mode(SYSID, mode))
         self.vehicle.receive("gcs", STATION.arm(SYSID))
-        self.vehicle.receive("gcs", STATION.set_mode(SYSID, 15))
+        if flies:
+            take_off = (Command.NAV_TAKEOFF, 0, 0, 0, math.nan, 0, 0, HEIGHT_M)
+            self.vehicle.receive("gcs", STATION.command_long(SYSID, *take_off))
+            self.down_m = -HEIGHT_M
 
     def step(self) -> None:
         self.ticks += 1
-        state = PhysicsState(self.ticks * 0.02, ZERO, AT_REST_MPS2, ZERO, ZERO, ZERO)
+        place = (0.0, 0.0, self.down_m)
+        state = PhysicsState(self.ticks * 0.02, ZERO, AT_REST_MPS2, place, ZERO, ZERO)
         pwm = self.vehicle.step(state)
         if not all(0 <= p <= 2200 for p in pwm):
             raise AssertionError(f"outputs out of range: {pwm}")
@@ -140,8 +150,10 @@ def main() -> int:
     recent: list[tuple[PortName, bytes]] = []
     try:
         while time.monotonic() < end_s:
-            subject = Subject(rng.randrange(2**31))
+            airframe = AIRFRAMES[counts["vehicles"] % len(AIRFRAMES)]
+            subject = Subject(rng.randrange(2**31), airframe)
             counts["vehicles"] += 1
+            counts[airframe] += 1
             for _ in range(LIFE):
                 port: PortName = rng.choice(("gcs", "gcs", "injector"))
                 recent = [(port, broken(rng, frame(rng))) for _ in range(BATCH)]
@@ -156,7 +168,7 @@ def main() -> int:
         for name, datagram in recent:
             print(name, datagram.hex(), file=sys.stderr)
         raise
-    print(f"seed {arguments.seed}: {counts['datagrams']} datagrams, {counts['vehicles']} vehicles")
+    print(f"seed {arguments.seed}: {dict(counts)}")
     return 0
 
 
