@@ -1,40 +1,47 @@
-"""A radio link as it is: datagrams get lost, late, doubled and out of order, in both directions.
+"""A radio link as it is: datagrams get lost, late, doubled, garbled and out of order, each way.
 
 Every datagram costs the same random draws, whatever becomes of it, so one seed and one sequence
-of datagrams give one outcome.
+of datagrams give one outcome, over UDP as in memory.
 """
 
 import heapq
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from hil.link import Link
-from hil.scenario import Radio, Scenario
+from hil.scenario import Radio, Scenario, in_effect
 
 HELD_BACK_S = 0.2  # how much later a duplicate, or a datagram out of order, comes
-_STREAM = 0x5241444F
+_STREAM, _GARBLE_STREAM = 0x5241444F, 0x47415242
+_PERFECT = Radio()
 _BLOCK = 256
 _OUT, _IN = 0, 1
 
 
 def impaired(link: Link, scenario: Scenario, sysid: int, clock: Callable[[], float]) -> Link:
-    """The MAVLink link of a vehicle as its radio makes it; `clock` gives its time (s)."""
-    radio = scenario.vehicle(sysid).radio or scenario.radio
-    if radio == Radio():
-        return link
-    return ImpairedLink(link, radio, (scenario.seed, sysid), clock)
+    """The vehicle's end of a MAVLink link as its radio makes it; `clock` gives its time (s)."""
+    own = scenario.vehicle(sysid).radio
+    radios = scenario.radio if own is None else own
+    return ImpairedLink(link, radios, (scenario.seed, sysid), clock) if radios else link
 
 
 class ImpairedLink:
-    """Wraps one end of a link. What is late leaves at the first call after its time."""
+    """Wraps the vehicle's end of a link. What is late leaves at the first call after its time.
+
+    Of radios that hold at the same time, the first counts; where none does, the link is perfect.
+    """
 
     def __init__(
-        self, link: Link, radio: Radio, seed: tuple[int, ...], clock: Callable[[], float]
+        self,
+        link: Link,
+        radios: Sequence[Radio],
+        seed: tuple[int, ...],
+        clock: Callable[[], float],
     ) -> None:
         self._link, self._clock = link, clock
-        self._out = _Way(radio, (*seed, _STREAM, _OUT))
-        self._in = _Way(radio, (*seed, _STREAM, _IN))
+        self._out = _Way([r for r in radios if r.direction != "to_vehicle"], (*seed, _OUT))
+        self._in = _Way([r for r in radios if r.direction != "to_station"], (*seed, _IN))
 
     def send(self, datagram: bytes) -> None:
         """To the peer, now, later, twice or never."""
@@ -56,17 +63,23 @@ class ImpairedLink:
 class _Way:
     """One direction: datagrams under way, by the time they arrive."""
 
-    def __init__(self, radio: Radio, seed: tuple[int, ...]) -> None:
-        self._radio, self._draws = radio, _uniform(seed)
+    def __init__(self, radios: Sequence[Radio], seed: tuple[int, ...]) -> None:
+        *base, way = seed
+        self._radios = radios
+        self._draws = _uniform((*base, _STREAM, way), 4)
+        self._garble_draws = _uniform((*base, _GARBLE_STREAM, way), 3)
         self._under_way: list[tuple[float, int, bytes]] = []
         self._count = 0
         self._last_s = 0.0
 
     def put(self, datagram: bytes, now_s: float) -> None:
         lost, doubled, swapped, jitter = next(self._draws)
-        radio = self._radio
+        hit, where, how = next(self._garble_draws)
+        radio = in_effect(self._radios, now_s) or _PERFECT
         if lost < radio.loss:
             return
+        if hit < radio.corruption:
+            datagram = _garbled(datagram, where, how)
         arrives_s = now_s + radio.delay_s + radio.jitter_s * jitter
         if swapped < radio.reordering:
             self._add(arrives_s + HELD_BACK_S, datagram)
@@ -87,7 +100,16 @@ class _Way:
         self._count += 1
 
 
-def _uniform(seed: tuple[int, ...]) -> Iterator[list[float]]:
+def _garbled(datagram: bytes, where: float, how: float) -> bytes:
+    """One byte is another one: a burst of up to eight bits, for the CRC-16 of MAVLink to notice."""
+    if not datagram:
+        return datagram
+    at, mask = int(where * len(datagram)), 1 + int(how * 255)
+    return datagram[:at] + bytes([datagram[at] ^ mask]) + datagram[at + 1 :]
+
+
+def _uniform(seed: tuple[int, ...], width: int) -> Iterator[list[float]]:
+    """Rows of `width` numbers in [0, 1), for ever."""
     rng = np.random.default_rng(np.random.SeedSequence(seed))
     while True:
-        yield from rng.random((_BLOCK, 4)).tolist()
+        yield from rng.random((_BLOCK, width)).tolist()

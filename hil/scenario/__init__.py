@@ -18,6 +18,7 @@ from hil.scenario.mission import (
     Planning,
     Priors,
 )
+from hil.scenario.periods import Period, in_effect
 from hil.scenario.places import Arena, Clock, OriginModel, Patch, Point, Slope, Terrain, Wind
 from hil.scenario.schema import Scenario
 from hil.scenario.station import STATION_AIRFRAMES, FleetMember, Safety, StationView, station_view
@@ -42,6 +43,7 @@ __all__ = [
     "Onset",
     "OriginModel",
     "Patch",
+    "Period",
     "Planning",
     "Plant",
     "Point",
@@ -55,6 +57,7 @@ __all__ = [
     "Terrain",
     "Vehicle",
     "Wind",
+    "in_effect",
     "load_scenario",
     "load_station_view",
     "station_view",

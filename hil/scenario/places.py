@@ -3,10 +3,11 @@
 import itertools
 from typing import Annotated, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from hil.frames import Origin
 from hil.scenario.fields import Finite, Metres, Model
+from hil.scenario.periods import Period, listed
 
 
 class OriginModel(Model):
@@ -64,29 +65,40 @@ class Clock(Model):
         return self
 
 
-class Wind(Model):
+class Wind(Period):
     """Where the air goes to, steadily."""
 
     north_mps: Annotated[float, Field(ge=-50, le=50)] = 0.0
     east_mps: Annotated[float, Field(ge=-50, le=50)] = 0.0
 
 
-class Slope(Model):
+class Slope(Period):
     """Rise of the ground per metre to the north and to the east."""
 
     north: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
     east: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
 
 
-class Patch(Arena):
+class Patch(Arena, Period):
     """A rectangle where rolling resistance and grip are multiplied by `friction`."""
 
     friction: Annotated[float, Field(ge=0, le=20)]
 
 
-class Terrain(Model):
-    """What the world does to everybody. Truth only; where patches overlap, the first counts."""
+Winds = Annotated[
+    tuple[Wind, ...], BeforeValidator(listed, json_schema_input_type=Wind | tuple[Wind, ...])
+]
+Slopes = Annotated[
+    tuple[Slope, ...], BeforeValidator(listed, json_schema_input_type=Slope | tuple[Slope, ...])
+]
 
-    wind: Wind = Wind()
-    slope: Slope = Slope()
+
+class Terrain(Model):
+    """What the world does to everybody. Truth only.
+
+    Of winds, slopes and patches that overlap, in time or in place, the first counts.
+    """
+
+    wind: Annotated[Winds, Field(max_length=100)] = ()
+    slope: Annotated[Slopes, Field(max_length=100)] = ()
     patches: Annotated[tuple[Patch, ...], Field(max_length=100)] = ()

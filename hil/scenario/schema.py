@@ -11,7 +11,7 @@ from hil.scenario.faults import FaultModel
 from hil.scenario.fields import MAX_PORT, PORTS_PER_VEHICLE, Model, Seed
 from hil.scenario.mission import Diagnosis, Expectation, Limits, Links, Planning
 from hil.scenario.places import Arena, Clock, OriginModel, Terrain
-from hil.scenario.vehicles import Plant, Radio, Sensors, Vehicle
+from hil.scenario.vehicles import Plant, Radios, Sensors, Vehicle
 
 
 class Scenario(Model):
@@ -26,7 +26,7 @@ class Scenario(Model):
     sensors: Sensors = Sensors()
     plant: Plant = Plant()
     terrain: Terrain = Terrain()
-    radio: Radio = Radio()
+    radio: Annotated[Radios, Field(max_length=100)] = ()
     faults: tuple[FaultModel, ...] = ()
     diagnosis: Diagnosis = Diagnosis()
     planning: Planning = Planning()

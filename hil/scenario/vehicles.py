@@ -1,8 +1,8 @@
 """The vehicles of a fleet, their radios and sensors, and how far they are from the data sheet."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from hil import airframe as airframes
 from hil.airframe import Airframe
@@ -18,21 +18,31 @@ from hil.scenario.fields import (
     SysId,
     VehicleName,
 )
+from hil.scenario.periods import Period, listed
 from hil.scenario.places import Point
 
 
-class Radio(Model):
-    """What a MAVLink link does to datagrams, in each direction. Truth only.
+class Radio(Period):
+    """What a MAVLink link does to datagrams, for a while or always. Truth only.
 
-    `jitter_s` adds up to so much to the delay and keeps the order; `reordering` and `duplication`
-    are shares of datagrams that come, or come again, 0.2 s late.
+    A loss of 1 is a black-out. `jitter_s` adds up to so much to the delay and keeps the order;
+    `reordering` and `duplication` are shares of datagrams that come, or come again, 0.2 s late;
+    `corruption` is the share of those in which a byte is garbled. What holds when a datagram is
+    sent, counts.
     """
 
-    loss: Share = 0.0
+    direction: Literal["both", "to_vehicle", "to_station"] = "both"
+    loss: Annotated[float, Field(ge=0, le=1)] = 0.0
     delay_s: Seconds = 0.0
     jitter_s: Seconds = 0.0
     duplication: Share = 0.0
     reordering: Share = 0.0
+    corruption: Annotated[float, Field(ge=0, le=1)] = 0.0
+
+
+Radios = Annotated[
+    tuple[Radio, ...], BeforeValidator(listed, json_schema_input_type=Radio | tuple[Radio, ...])
+]
 
 
 class Vehicle(Model):
@@ -43,7 +53,7 @@ class Vehicle(Model):
     start: Point
     start_yaw_deg: Finite = 0.0
     goal: Point
-    radio: Radio | None = None  # None: the scenario's
+    radio: Annotated[Radios, Field(max_length=100)] | None = None  # None: the scenario's
 
     @property
     def frame(self) -> Airframe:

@@ -20,11 +20,19 @@ from hil.airframe import (
 )
 from hil.frames import body_to_ned, ned_to_body, wrap_pi
 from hil.physics_link import AT_REST_MPS2, PhysicsState, Vector3
-from hil.scenario import Arena, Scenario, Terrain, Vehicle
+from hil.scenario import Arena, Scenario, Vehicle
 from hil.world.flight import Air, in_body, load_n, step, thrust_ned
 from hil.world.ground import Ground
 from hil.world.plant import real_airframe
-from hil.world.terrain import drag_n, friction_factor, slope_force_n, wind_force_n
+from hil.world.terrain import (
+    Ambient,
+    ambient,
+    change_times_s,
+    drag_n,
+    friction_factor,
+    slope_force_n,
+    wind_force_n,
+)
 from hil.world.truth import Contact, TruthRecord, VehicleTruth
 
 SOLVER_ITERATIONS = 30
@@ -47,7 +55,7 @@ class _Vehicle:
     def velocity_mps(self) -> Vector3:
         return self.body.velocity.x, self.body.velocity.y, self.air.down_mps
 
-    def drive(self, pwm_us: Sequence[int], terrain: Terrain, dt_s: float) -> None:
+    def drive(self, pwm_us: Sequence[int], terrain: Ambient, dt_s: float) -> None:
         """Forces for the next step: motors, slope, wind, and what the ground may hold."""
         outputs = [pwm_to_output(pwm) for pwm in pwm_us[: len(self.frame.motors)]]
         outputs += [None] * (len(self.frame.motors) - len(outputs))
@@ -59,7 +67,7 @@ class _Vehicle:
             load_n = self._fly(outputs, terrain, dt_s)
             self.ground.hold(friction * load_n / self.frame.weight_n, ())
 
-    def _roll(self, outputs: Sequence[float | None], terrain: Terrain) -> None:
+    def _roll(self, outputs: Sequence[float | None], terrain: Ambient) -> None:
         yaw, velocity = self.body.angle, self.body.velocity
         velocity_body = ned_to_body(velocity.x, velocity.y, yaw)
         fx, fy, torque = motor_forces(
@@ -71,7 +79,7 @@ class _Vehicle:
         self.body.force = north + down_n + wind_n, east + down_e + wind_e
         self.body.torque = torque
 
-    def _fly(self, outputs: Sequence[float | None], terrain: Terrain, dt_s: float) -> float:
+    def _fly(self, outputs: Sequence[float | None], terrain: Ambient, dt_s: float) -> float:
         """Returns what the ground carries (N)."""
         rotors = lift(self.frame, outputs)
         north, east, down = thrust_ned(self.air, self.body.angle, rotors.thrust_n)
@@ -87,7 +95,7 @@ class _Vehicle:
         low, high = -self.air.down_m, -self.air.down_m + self.frame.height_m
         return low <= -other.air.down_m + other.frame.height_m and -other.air.down_m <= high
 
-    def state(self, time_s: float, terrain: Terrain) -> PhysicsState:
+    def state(self, time_s: float, terrain: Ambient) -> PhysicsState:
         (n, e), yaw, air = self.body.position, self.body.angle, self.air
         velocity = self.velocity_mps
         accel = AT_REST_MPS2
@@ -103,7 +111,7 @@ class _Vehicle:
             attitude_rad=(air.roll_rad, air.pitch_rad, wrap_pi(yaw)),
         )
 
-    def _specific_force(self, before_mps: Vector3, dt: float, terrain: Terrain) -> Vector3:
+    def _specific_force(self, before_mps: Vector3, dt: float, terrain: Ambient) -> Vector3:
         """What an accelerometer feels (body): acceleration less gravity, mean over the frame."""
         n, e, d = (
             (now - then) / dt for now, then in zip(self.velocity_mps, before_mps, strict=True)
@@ -129,6 +137,8 @@ class World:
         self._contacts: list[Contact] = []
         self._names: dict[pymunk.Shape, str] = {}
         self._terrain = scenario.terrain
+        self._ambient = ambient(scenario.terrain, 0.0)
+        self._changes_s = change_times_s(scenario.terrain)  # those to come
         self._add_walls(scenario.arena)
         self._vehicles = {
             v.sysid: self._add_vehicle(
@@ -149,8 +159,11 @@ class World:
     def step(self, outputs: Mapping[int, Sequence[int]]) -> None:
         """One physics step under PWM outputs (us) by system id; who is missing has no power."""
         self._contacts.clear()
+        if self._changes_s and self.time_s >= self._changes_s[0] - 1e-9:
+            self._ambient = ambient(self._terrain, self.time_s)
+            self._changes_s = [s for s in self._changes_s if s > self.time_s + 1e-9]
         for sysid, vehicle in self._vehicles.items():
-            vehicle.drive(outputs.get(sysid, ()), self._terrain, 1.0 / self.physics_hz)
+            vehicle.drive(outputs.get(sysid, ()), self._ambient, 1.0 / self.physics_hz)
         self.steps += 1
         self._space.step(1.0 / self.physics_hz)
 
@@ -158,7 +171,7 @@ class World:
         """The reply that ends a frame; its acceleration is the mean since the previous reply."""
         vehicle = self._vehicles[sysid]
         if vehicle.last is None or vehicle.last.time_s != self.time_s:
-            vehicle.last = vehicle.state(self.time_s, self._terrain)
+            vehicle.last = vehicle.state(self.time_s, self._ambient)
         return vehicle.last
 
     def truth(self) -> TruthRecord:

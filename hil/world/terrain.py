@@ -5,16 +5,42 @@ has beyond that, so that without wind there is no such force at all.
 """
 
 import math
+from dataclasses import dataclass
 
 from hil.airframe import GRAVITY_MPS2, Airframe
-from hil.scenario import Patch, Slope, Terrain, Wind
+from hil.scenario import Patch, Slope, Terrain, Wind, in_effect
 
 AIR_DENSITY_KGPM3 = 1.225  # ISA, sea level
 
 Vector = tuple[float, float, float]
 
 
-def friction_factor(terrain: Terrain, north_m: float, east_m: float) -> float:
+@dataclass(frozen=True)
+class Ambient:
+    """What a terrain is at one moment."""
+
+    wind: Wind
+    slope: Slope
+    patches: tuple[Patch, ...]
+
+
+def ambient(terrain: Terrain, time_s: float) -> Ambient:
+    """What holds at a world time: calm and level where nothing does."""
+    return Ambient(
+        in_effect(terrain.wind, time_s) or Wind(),
+        in_effect(terrain.slope, time_s) or Slope(),
+        tuple(p for p in terrain.patches if p.holds(time_s)),
+    )
+
+
+def change_times_s(terrain: Terrain) -> list[float]:
+    """When `ambient` may become another one, in order."""
+    periods = (*terrain.wind, *terrain.slope, *terrain.patches)
+    ends = {p.until_s for p in periods if p.until_s is not None}
+    return sorted({p.from_s for p in periods} | ends)
+
+
+def friction_factor(terrain: Ambient, north_m: float, east_m: float) -> float:
     """What multiplies rolling resistance and grip at a place."""
     return next((p.friction for p in terrain.patches if _inside(p, north_m, east_m)), 1.0)
 

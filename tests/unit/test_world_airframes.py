@@ -358,6 +358,66 @@ def test_patches_change_how_far_it_rolls() -> None:
         assert w.truth().vehicles[1].north_m == pytest.approx(way, abs=STEP_S)
 
 
+@pytest.mark.parametrize("listed", [False, True])
+def test_a_slope_begins_and_ends(listed: bool) -> None:
+    """At rest, then uniform acceleration for a second, then it rolls out."""
+    slope = {"north": 0.3, "from_s": 1.0, "until_s": 2.0}
+    w = world(("omni_plus", 0, 0), terrain={"slope": [slope] if listed else slope})
+    run(w, 1.0, {})
+    assert w.truth().vehicles[1].north_mps == 0.0
+    run(w, 1.0, {})
+    c = OMNI_PLUS.rolling_resistance
+    speed = GRAVITY_MPS2 * (0.3 / math.hypot(1, 0.3) - c)
+    here = w.truth().vehicles[1]
+    assert here.north_mps == pytest.approx(-speed, abs=1e-6)
+    run(w, 4.0, {})
+    way = w.truth().vehicles[1].north_m - here.north_m
+    assert way == pytest.approx(-(speed**2) / (2 * c * GRAVITY_MPS2), abs=speed * STEP_S)
+    assert w.truth().vehicles[1].north_mps == 0.0
+
+
+def test_a_gust_begins_and_ends() -> None:
+    """Momentum is the force of the wind on what hardly moves, times its time."""
+    gust = {"north_mps": 20.0, "from_s": 0.5, "until_s": 0.6}
+    calm = {"north_mps": 0.0}
+    w = world(("omni_plus", 0, 0), terrain={"wind": [gust, calm]})
+    run(w, 0.5, {})
+    assert w.truth().vehicles[1].north_mps == 0.0
+    run(w, 0.1, {})
+    force_n = 0.5 * AIR_DENSITY_KGPM3 * 0.15 * 400.0 - OMNI_PLUS.rolling_force_n
+    speed = 0.1 * force_n / OMNI_PLUS.mass_kg
+    assert w.truth().vehicles[1].north_mps == pytest.approx(speed, rel=0.03)
+    run(w, 2.0, {})
+    assert w.truth().vehicles[1].north_mps == 0.0
+
+
+def test_a_patch_begins_and_ends_and_the_first_of_two_counts() -> None:
+    """Ice from 0 s to 1 s over ground of twice the friction."""
+    square = {"north_min_m": -40, "north_max_m": 40, "east_min_m": -40, "east_max_m": 40}
+    ice = square | {"friction": 0.0, "until_s": 1.0}
+    w = world(("omni_plus", 0, 0), terrain={"patches": [ice, square | {"friction": 2.0}]})
+    launch(w, 2.0, 0.0)
+    run(w, 1.0, {})
+    assert w.truth().vehicles[1].north_m == pytest.approx(2.0)
+    run(w, 4.0, {})
+    way = 4.0 / (2 * 2.0 * OMNI_PLUS.rolling_resistance * GRAVITY_MPS2)
+    assert w.truth().vehicles[1].north_m == pytest.approx(2.0 + way, abs=2 * STEP_S)
+
+
+def test_a_slope_that_comes_later_shows_in_telemetry() -> None:
+    """An accelerometer does not feel the pull of the slope, only the ground that holds back."""
+    w = world(("omni_plus", 0, 0), terrain={"slope": {"north": 0.3, "from_s": 1.0}})
+    run(w, 0.98, {})
+    w.state(1)
+    run(w, 0.02, {})
+    assert w.state(1).accel_body_mps2[0] == pytest.approx(0.0, abs=1e-9)
+    run(w, 0.02, {})
+    state = w.state(1)
+    rolling = OMNI_PLUS.rolling_resistance * GRAVITY_MPS2
+    assert state.velocity_mps[0] < 0.0
+    assert state.accel_body_mps2[0] == pytest.approx(rolling, abs=1e-6)
+
+
 def test_data_sheets_hold_together() -> None:
     for frame in AIRFRAMES.values():
         assert isinstance(frame.flight, Flight | None)
