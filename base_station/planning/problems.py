@@ -7,6 +7,7 @@ from base_station.planning.policy import Commands
 from base_station.planning.requests import PlanRequest
 from base_station.planning.tasks.alpha import AlphaProblem
 from base_station.planning.tasks.beta import BetaProblem
+from base_station.planning.tasks.limits import Limits
 from base_station.planning.tasks.objectives import Information, Objective, PaperDistance
 from base_station.twin import YAW, FaultArrays, FleetModel, fault_rows
 from hil.scenario import StationView
@@ -28,7 +29,9 @@ def alpha_problem(view: StationView, request: PlanRequest) -> AlphaProblem:
         suspect=suspect,
         period_s=1.0 / view.clock.control_hz,
         steps=round(view.planning.alpha_horizon_s * view.clock.control_hz),
+        limits=Limits.of_view(view, suspect),
         objective=objective_of(view.planning.objective, request.posterior),
+        weights=tuple(p / sum(request.posterior) for p in request.posterior),
     )
 
 

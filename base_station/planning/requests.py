@@ -49,6 +49,34 @@ class PlanProgress:
 
 
 @dataclass(frozen=True)
+class Contact:
+    """Two vehicles (system ids) that a plan lets touch: impulse and closing speed that 90 % of
+    draws stay below, under the hypothesis that expects more."""
+
+    between: tuple[int, int]
+    impulse_ns: float
+    speed_mps: float
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a plan is expected to bring and to cost, over the twin's uncertain parameters.
+
+    `information_bits` of the `open_bits` that the hypotheses leave: the mean over draws, and
+    `information_low_bits`, their 10th percentile. `energy_j` is mean work against rolling
+    resistance, `cost` the price of contacts, time and energy in units of `information`'s reward.
+    """
+
+    open_bits: float
+    information_bits: float
+    information_low_bits: float
+    contacts: tuple[Contact, ...]
+    duration_s: float
+    energy_j: float
+    cost: float
+
+
+@dataclass(frozen=True)
 class OpenLoopPlan:
     """Plan alpha: set-points [K, V, 3] (north m/s, east m/s, yaw rad; NaN yaw: not commanded).
 
@@ -63,6 +91,7 @@ class OpenLoopPlan:
     held: tuple[int, ...]
     predicted_error: float
     predicted_reports: Array
+    prediction: Prediction | None = None
 
 
 @dataclass(frozen=True)
@@ -171,7 +200,18 @@ def _plan(tree: dict[str, Any] | None) -> OpenLoopPlan | None:
         tuple(tree["held"]),
         tree["predicted_error"],
         _array(tree["predicted_reports"]),
+        _prediction(tree["prediction"]),
     )
+
+
+def _prediction(tree: dict[str, Any] | None) -> Prediction | None:
+    if tree is None:
+        return None
+    contacts = tuple(
+        Contact((c["between"][0], c["between"][1]), c["impulse_ns"], c["speed_mps"])
+        for c in tree["contacts"]
+    )
+    return Prediction(**{**tree, "contacts": contacts})
 
 
 def _policy(tree: dict[str, Any] | None) -> PolicyWeights | None:

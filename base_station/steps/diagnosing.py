@@ -1,6 +1,6 @@
 """[0b]-[2]: from an anomaly to a verdict, by experiment."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from base_station.diagnosis import Verdict
 from base_station.execution import Orders
 from base_station.hypotheses import NONE, UNKNOWN
 from base_station.phases import Concluding, Experimenting, PlanningAlpha, Settling
+from base_station.planning.requests import OpenLoopPlan
 from base_station.steps.travelling import request_beta
 from base_station.telemetry import Frame
 from base_station.watch import Watch
@@ -55,12 +56,32 @@ def await_alpha(desk: Desk, number: int, frame: Frame) -> Orders:
         desk.stop("cannot tell: no manoeuvre found that tells the hypotheses apart")
         return desk.hold()
     desk.doubt = doubts.anchor(doubts.awake(desk.open_doubt), desk.mean_report_m())
-    error = answer.plan.predicted_error
-    duration_s = len(answer.plan.setpoints) * answer.plan.period_s
-    text = f"plan alpha: predicted error {error:.2g} over {duration_s:.1f} s"
-    desk.say("plan", text, predicted_error=error)
+    desk.say("plan", announced(answer.plan), **_foretold(answer.plan))
     desk.enter(Experimenting(answer.plan, frame.time_s))
     return desk.hold()
+
+
+def announced(plan: OpenLoopPlan) -> str:
+    """A plan in a line, before it is driven."""
+    duration_s = len(plan.setpoints) * plan.period_s
+    text = f"plan alpha: predicted error {plan.predicted_error:.2g} over {duration_s:.1f} s"
+    if (told := plan.prediction) is None:
+        return text
+    touches = "; ".join(
+        f"{a} and {b} touch, up to {c.speed_mps:.2f} m/s, {c.impulse_ns:.1f} N s"
+        for c in told.contacts
+        for a, b in [c.between]
+    )
+    return (
+        f"{text}; {told.information_bits:.2f} of {told.open_bits:.2f} bit, "
+        f"{told.information_low_bits:.2f} in the worst tenth; {told.energy_j:.0f} J; "
+        f"{touches or 'no contact'}"
+    )
+
+
+def _foretold(plan: OpenLoopPlan) -> dict[str, object]:
+    told = {} if plan.prediction is None else asdict(plan.prediction)
+    return {"predicted_error": plan.predicted_error, **told}
 
 
 def experiment(desk: Desk, phase: Experimenting, frame: Frame) -> Orders:

@@ -47,8 +47,24 @@ class Planning(Model):
     planning_sim_s: NonNegative = 2.0
 
 
+class Manoeuvre(Model):
+    """What an experiment may do, beside its duration (`planning.alpha_horizon_s`); None: no limit.
+
+    `contacts` says who may touch whom: any two, only somebody and the suspect, or nobody;
+    `untouchable` lists vehicles that nobody may touch.
+    """
+
+    contact_speed_mps: Positive | None = None
+    contact_impulse_ns: Positive | None = None
+    contacts: Literal["any", "suspect", "none"] = "any"
+    untouchable: tuple[SysId, ...] = ()
+    wall_margin_m: NonNegative = 0.0
+
+
 class Limits(Model):
     """What the station allows itself."""
+
+    manoeuvre: Manoeuvre = Manoeuvre()
 
     speed_mps: Positive = 1.0
     probe_speed_mps: Positive = 0.5

@@ -14,7 +14,10 @@ from base_station.planning.tasks.evaluation import (
     plan_errors,
     separation,
 )
+from base_station.planning.tasks.limits import Limits
 from base_station.twin import EAST, FleetModel, fault_rows, initial_state
+
+ANYTHING = Limits(np.inf, np.inf, np.ones((3, 3), dtype=np.bool_), 0.0)
 
 
 def two_reports(moved_m: float, samples: int) -> np.ndarray:
@@ -69,7 +72,7 @@ def scene(rescue_view):
 
 def errors_of(scene, plan):
     model, faults, start, driven = scene
-    return plan_errors(model, faults, start, plan, driven, 0.5, np.random.default_rng(0))
+    return plan_errors(model, faults, start, plan, driven, 0.5, ANYTHING, np.random.default_rng(0))
 
 
 def test_a_push_decides_and_standing_by_does_not(scene, rescue_view):
@@ -85,7 +88,7 @@ def test_commanding_the_suspect_itself_does_not_decide(scene, rescue_view):
     plan[0, :4, 1, 1] = 0.5
     driven = np.array([True, True, True])
     rng = np.random.default_rng(0)
-    assert plan_errors(model, faults, start, plan, driven, 0.5, rng).tolist() == [0.5]
+    assert plan_errors(model, faults, start, plan, driven, 0.5, ANYTHING, rng).tolist() == [0.5]
 
 
 def test_a_plan_into_the_wall_is_invalid(scene, rescue_view):

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from base_station.planning.actors import Actor
 from base_station.planning.policy import Commands, to_setpoints
+from base_station.planning.tasks.limits import PRICE, Contacts, Limits
+from base_station.planning.tasks.motion import move
 from base_station.planning.tasks.objectives import Moment, Objective, Terms
 from base_station.planning.tasks.starts import scattered
 from base_station.planning.tasks.task import Step
@@ -21,7 +23,6 @@ from base_station.twin import (
     FaultArrays,
     FleetModel,
     Parameters,
-    advance_in_place,
     perturbed,
     report,
 )
@@ -38,7 +39,8 @@ SCALE_M = 2.0
 class AlphaProblem:
     """Tell the hypotheses in `faults` apart from states `start` [H, V, S] in `steps` periods.
 
-    `objective` says what that is worth.
+    `objective` says what that is worth, `limits` what it must not do;
+    `weights` [H] is the posterior before the experiment.
     """
 
     model: FleetModel
@@ -49,6 +51,8 @@ class AlphaProblem:
     period_s: float
     steps: int
     objective: Objective
+    limits: Limits
+    weights: tuple[float, ...]
 
     def move(self, parameters: Parameters, states: Array, memory: Array, setpoints: Array) -> Terms:
         """One control period of states [E, H, V, S] and memory [E, M] in place: named rewards.
@@ -58,28 +62,26 @@ class AlphaProblem:
         hypotheses, count = states.shape[1:3]
         batch = states.reshape(-1, *states.shape[2:])
         walls = np.zeros(batch.shape[:2], dtype=np.bool_)
-        pairs = count if self.objective.contacts else 0
-        impulses = np.zeros((len(batch), pairs, pairs))
-        advance_in_place(
-            self.model,
-            parameters,
-            self.faults,
-            batch,
-            np.repeat(setpoints, hypotheses, axis=0),
-            np.tile(self.commands.driven, (len(batch), 1)),
-            self.period_s,
-            impulses,
-            walls,
+        impulses = self.objective.contacts or self.limits.of_contacts
+        met = Contacts.none(len(batch), count, impulses, self.limits.of_speed)
+        commanded = np.repeat(setpoints, hypotheses, axis=0)
+        driven = np.tile(self.commands.driven, (len(batch), 1))
+        move(
+            self.model, parameters, self.faults, batch, commanded, driven, self.period_s, walls, met
         )
+        pairs = met.impulses_ns.shape[1]
         moment = Moment(
             self.model,
             self.period_s,
             states,
             self.reports(states),
             walls.reshape(states.shape[:3]),
-            impulses.reshape(*states.shape[:2], pairs, pairs),
+            met.impulses_ns.reshape(*states.shape[:2], pairs, pairs),
         )
         terms = self.objective.terms(moment, memory)
+        if self.limits.any:
+            breaches = self.limits.breaches(met, batch, self.model)
+            terms["limit"] = -PRICE * breaches.reshape(states.shape[:2]).sum(axis=1)
         if not self.objective.own_state:
             states[:] = states[:, :1]
         return terms

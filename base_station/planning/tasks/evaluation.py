@@ -3,19 +3,23 @@
 from dataclasses import dataclass
 from itertools import combinations
 from math import erfc, sqrt
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from base_station.planning.tasks.limits import Contacts, Limits
+from base_station.planning.tasks.motion import move
 from base_station.twin import (
     EAST,
     HELD_EAST,
     HELD_NORTH,
     NORTH,
+    V_EAST,
+    V_NORTH,
     FaultArrays,
     FleetModel,
     Parameters,
-    advance_in_place,
     perturbed,
     report,
 )
@@ -34,10 +38,15 @@ INVALID = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """`reports` [N, H, K + 1, V, 2] (m) from the start on; `walls` [N]: did any twin touch one?"""
+    """`reports` [N, H, K + 1, V, 2] (m) from the start on; `walls` [N]: did any twin touch one?
+    `breaches` [N]: was any limit broken? `contacts` of N x H rows, if asked for; `work_j` [N, H]
+    against rolling resistance."""
 
     reports: Array
     walls: Flags
+    breaches: Flags
+    contacts: Contacts
+    work_j: Array
 
 
 def predict(
@@ -48,22 +57,41 @@ def predict(
     setpoints: Array,
     driven: Flags,
     period_s: float,
+    limits: Limits,
+    contacts_too: bool = False,
 ) -> Prediction:
     """Play plans [N, K, V, 3] from states [N, H, V, S] under all hypotheses."""
     n, hypotheses = states.shape[:2]
     batch = states.reshape(-1, *states.shape[2:]).copy()
     walls = np.zeros(batch.shape[:2], dtype=np.bool_)
     flags = np.tile(driven, (len(batch), 1))
-    no_impulses = np.empty((len(batch), 0, 0))
+    impulses, speeds = contacts_too or limits.of_contacts, contacts_too or limits.of_speed
+    whole = Contacts.none(len(batch), model.size, impulses, speeds)
+    broken, work_j = np.zeros(len(batch)), np.zeros(len(batch))
     reports = [report(batch, faults)]
     for k in range(setpoints.shape[1]):
         commanded = np.repeat(setpoints[:, k], hypotheses, axis=0)
-        advance_in_place(
-            model, parameters, faults, batch, commanded, flags, period_s, no_impulses, walls
-        )
+        met = Contacts.none(len(batch), model.size, impulses, speeds)
+        move(model, parameters, faults, batch, commanded, flags, period_s, walls, met)
+        whole.add(met)
+        broken += limits.breaches(met, batch, model)
+        work_j += rolling_work_j(model, batch, period_s)
         reports.append(report(batch, faults))
     stacked = np.stack(reports, axis=1).reshape(n, hypotheses, len(reports), -1, 2)
-    return Prediction(stacked, np.asarray(walls.reshape(n, -1).any(axis=1)))
+    return Prediction(
+        stacked,
+        np.asarray(walls.reshape(n, -1).any(axis=1)),
+        np.asarray(broken.reshape(n, -1).any(axis=1)),
+        whole,
+        work_j.reshape(n, hypotheses),
+    )
+
+
+def rolling_work_j(model: FleetModel, states: Array, period_s: float) -> Array:
+    """What rolling resistance takes in a period at the speeds of states [..., V, S]: [...]."""
+    speed = np.linalg.norm(states[..., V_NORTH : V_EAST + 1], axis=-1)
+    work: Array = (speed * model.nominal.rolling_force_n[0]).sum(axis=-1) * period_s
+    return work
 
 
 def separation(reports: Array) -> Array:
@@ -97,6 +125,24 @@ def confusion(d_prime: Array) -> Array:
     return errors
 
 
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """`count` fleets as they may be: parameters (P = count) and starts [count, H, V, S]."""
+
+    parameters: Parameters
+    starts: Array
+
+    @classmethod
+    def of(cls, model: FleetModel, start: Array, rng: np.random.Generator, count: int) -> Self:
+        """Draws of the twin's uncertain parameters and of where states [H, V, S] really are."""
+        parameters = perturbed(model, rng, count)
+        states = np.repeat(start[None], count, axis=0)
+        noise = START_SIGMA_M * rng.standard_normal((count, 1, model.size, 2))
+        states[..., NORTH : EAST + 1] += noise
+        states[..., HELD_NORTH : HELD_EAST + 1] += noise  # else it would be evidence by itself
+        return cls(parameters, states)
+
+
 def plan_errors(
     model: FleetModel,
     faults: FaultArrays,
@@ -104,30 +150,28 @@ def plan_errors(
     plans: Array,
     driven: Flags,
     period_s: float,
+    limits: Limits,
     rng: np.random.Generator,
     draws: int = DRAWS,
 ) -> Array:
     """The error that 90 % of draws stay below, [C], for plans [C, K, V, 3] from states [H, V, S].
 
-    Draws are of the twin's uncertain parameters and of the start, the same for every plan.
-    1.0 (INVALID) for plans that touch a wall too often.
+    The draws are the same for every plan. 1.0 (INVALID) for plans that touch a wall too often, or
+    break a limit in any draw.
     """
-    count = len(plans)
-    parameters = perturbed(model, rng, draws)
-    states = np.repeat(start[None], draws, axis=0)
-    noise = START_SIGMA_M * rng.standard_normal((draws, 1, model.size, 2))
-    states[..., NORTH : EAST + 1] += noise
-    states[..., HELD_NORTH : HELD_EAST + 1] += noise  # else it would be evidence by itself
-    tiled = Parameters(*(np.tile(x, (count, *[1] * (x.ndim - 1))) for x in parameters))
+    count, drawn = len(plans), Draws.of(model, start, rng, draws)
+    tiled = (np.tile(x, (count, *[1] * (x.ndim - 1))) for x in drawn.parameters)
     prediction = predict(
         model,
-        tiled,
+        Parameters(*tiled),
         faults,
-        np.tile(states, (count, 1, 1, 1)),
+        np.tile(drawn.starts, (count, 1, 1, 1)),
         np.repeat(plans, draws, axis=0),
         driven,
         period_s,
+        limits,
     )
     errors = confusion(separation(prediction.reports)).reshape(count, draws)
-    walls = prediction.walls.reshape(count, draws).mean(axis=1)
-    return np.where(walls > WALL_SHARE, INVALID, np.quantile(errors, PERCENTILE, axis=1))
+    walls = prediction.walls.reshape(count, draws).mean(axis=1) > WALL_SHARE
+    breaches = prediction.breaches.reshape(count, draws).any(axis=1)
+    return np.where(walls | breaches, INVALID, np.quantile(errors, PERCENTILE, axis=1))

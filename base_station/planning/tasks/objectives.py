@@ -7,8 +7,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.planning.tasks.evaluation import pair_squares
-from base_station.twin import V_EAST, V_NORTH, FleetModel
+from base_station.planning.tasks.evaluation import pair_squares, rolling_work_j
+from base_station.twin import FleetModel
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -98,8 +98,7 @@ class Information:
         moved = np.linalg.norm(moment.reports - first, axis=-1, keepdims=True)
         squares += pair_squares(moment.reports, moved)
         after = known_share(squares, self.weights)
-        speed = np.linalg.norm(moment.states[..., V_NORTH : V_EAST + 1], axis=-1)
-        work = (speed * moment.model.nominal.rolling_force_n[0]).sum(axis=-1) * moment.period_s
+        work = rolling_work_j(moment.model, moment.states, moment.period_s)
         impulse = 0.5 * moment.impulses_ns.sum(axis=(-2, -1))
         return {
             "information": GAIN * (after - before),
@@ -142,8 +141,14 @@ def known_share(squares: Array, weights: tuple[float, ...]) -> Array:
     for k, (a, b) in enumerate(combinations(range(len(prior)), 2)):
         alike[:, a, b] = alike[:, b, a] = np.exp(-squares[:, k] / 8.0)
     information = -np.log(alike @ prior) @ prior
-    share: Array = information / -(np.log(prior) @ prior)
+    share: Array = information / entropy(weights)
     return share
+
+
+def entropy(weights: tuple[float, ...]) -> float:
+    """Of a posterior [H], in nats."""
+    prior = np.asarray(weights)
+    return float(-(np.log(prior) @ prior))
 
 
 def wall_term(moment: Moment) -> Array:
