@@ -106,7 +106,7 @@ def test_a_plan_states_what_it_is_expected_to_bring_and_to_cost(rescue_view):
     assert 0.95 < told.information_low_bits <= told.information_bits + 1e-9 <= 1.0 + 1e-8
     (contact,) = told.contacts
     assert contact.between == (1, 2)
-    assert 0.8 < contact.speed_mps < 1.1
+    assert 1.0 < contact.speed_mps < 1.2  # 1 m/s commanded; the strongest of uncertain motors
     assert contact.impulse_ns > 1.0
     assert told.duration_s == 8.0
     assert told.energy_j > 1.0

@@ -1,10 +1,15 @@
 """The scripted rescue: drives what can drive, pushes what can't. It tells which layouts are
-feasible, and what a learned policy must beat; it plans nothing and is not sent to vehicles."""
+feasible, and what a learned policy must beat; it plans nothing and is not sent to vehicles.
+
+The broken vehicle drives along its live axis until a push along the dead one leads to its goal. The
+helper that is nearest to the place behind it goes there and pushes; whoever is in the way of the
+broken one makes room; everybody else drives home, round the others.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.planning.scripted.around import get_behind
+from base_station.planning.scripted.steering import away_from_segment, steer
 from base_station.planning.tasks.beta import BetaProblem
 from base_station.twin import EAST, NORTH
 
@@ -13,60 +18,97 @@ Flags = NDArray[np.bool_]
 
 CRAWL_MPS = 0.45  # a pusher needs a third of full speed to start
 GAIN = 0.8  # m/s per m, of a push
-ALIGNED_M = 0.05  # the broken one drives along its good axis first, to within this
+ALIGNED_M = 0.05  # the broken one drives along its live axis first, to within this
 HOME_GAIN = 1.5
-CLOSE_M = 1.0  # the way home goes round others that are closer
-SWERVE = 1.2
+GAP_M = 0.15  # between rims, on the way round others
+BEHIND_M = 0.2  # between rims, of the place where a push begins
+LATERAL_M = 0.08  # how well aligned a pusher must be
+ROOM_M = 0.15  # that the way of the broken one is kept free by, beside its own width
 
 
 def push(problem: BetaProblem, states: Array, delivered: Flags) -> Array:
     """Actions [E, A] for states [E, V, S] and what is `delivered` [E, V]; yaw stays as it is."""
     position = states[..., NORTH : EAST + 1]
-    velocity = _home(problem, position, delivered)
+    velocity = np.stack([_home(problem, position, delivered, v) for v in _all(problem)], axis=1)
     if problem.broken is not None and problem.blocked.any():
-        _rescue(problem, position, delivered, velocity)
+        _rescue(problem, problem.broken, position, delivered, velocity)
     speed = np.linalg.norm(velocity, axis=-1, keepdims=True)
     velocity /= np.maximum(1.0, speed)
-    return velocity[:, problem.commands.commanded].reshape(len(states), -1)
+    commanded = velocity[:, problem.commands.commanded]
+    if problem.commands.yaw_free:
+        commanded = np.concatenate([commanded, np.zeros((*commanded.shape[:2], 1))], axis=-1)
+    return commanded.reshape(len(states), -1)
 
 
-def _home(problem: BetaProblem, position: Array, delivered: Flags) -> Array:
-    """Everybody to the goal [E, V, 2], swerving to the right of who is in the way."""
-    way = problem.goals_m - position
-    velocity = HOME_GAIN * way * ~delivered[..., None]
-    length = np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-9)
-    heading = way / length
-    right = np.stack([-heading[..., 1], heading[..., 0]], axis=-1)
-    for other in range(problem.model.size):
-        offset = position[:, other, None] - position
-        distance = np.linalg.norm(offset, axis=-1, keepdims=True)
-        ahead = (offset * heading).sum(axis=-1, keepdims=True)
-        near = (ahead > 0.0) & (distance < CLOSE_M) & (ahead < length) & (distance > 0.0)
-        velocity += SWERVE * right * (near & ~delivered[..., None])
-    return velocity
+def _all(problem: BetaProblem) -> range:
+    return range(problem.model.size)
 
 
-def _rescue(problem: BetaProblem, position: Array, delivered: Flags, velocity: Array) -> None:
-    """Overwrite the velocities of the broken vehicle and of its pusher while it is not home."""
-    broken = problem.broken
-    assert broken is not None
+def _home(problem: BetaProblem, position: Array, delivered: Flags, v: int) -> Array:
+    """Vehicle `v` to its goal [E, 2]; who has delivered stays."""
+    goal = np.broadcast_to(problem.goals_m[v], position[:, v].shape)
+    return _round(problem, position, v, goal) * ~delivered[:, v, None]
+
+
+def _round(problem: BetaProblem, position: Array, v: int, target: Array) -> Array:
+    """Vehicle `v` to `target` [E, 2], round all others."""
+    bounds, radius = problem.model.vehicles.bounds_m, problem.model.vehicles.radius_m
+    others = [k for k in _all(problem) if k != v]
+    low, high = bounds[[0, 2]] + radius[v], bounds[[1, 3]] - radius[v]
+    if not others:
+        return HOME_GAIN * (target - position[:, v])
+    clear = radius[v] + radius[others] + GAP_M
+    target = np.clip(target, low + 0.02, high - 0.02)
+    return steer(position[:, v], target, position[:, others], clear, low, high)
+
+
+def _rescue(
+    problem: BetaProblem, broken: int, position: Array, delivered: Flags, velocity: Array
+) -> None:
+    """Overwrite the velocities of the broken vehicle, its pusher, and whoever is in the way."""
     rows, radius = np.arange(len(position)), problem.model.vehicles.radius_m
-    way = problem.goals_m[broken] - position[:, broken]
+    here = position[:, broken]
+    way = problem.goals_m[broken] - here
     blocked = way @ problem.blocked
     free = way - blocked
     left = np.linalg.norm(blocked, axis=1, keepdims=True)
     direction = blocked / np.maximum(left, 1e-9)
     helpers = np.array([v for v in problem.commands.commanded if v != broken])
-    behind = (position[:, broken, None] - position[:, helpers]) @ direction[..., None]
-    pusher = helpers[np.argmax(behind[..., 0], axis=1)]
+    if not len(helpers):
+        return
     reach = float(radius[broken] + radius[helpers].max())
-    drive, ready = get_behind(position[rows, pusher], position[:, broken], direction, reach)
+    turn = here + free  # from here on it is pushed
+    spot = turn - (reach + BEHIND_M) * direction
+    pusher = helpers[np.linalg.norm(position[:, helpers] - spot[:, None], axis=-1).argmin(axis=1)]
+    wanted = ~delivered[:, broken] & (left[:, 0] > 0.5 * problem.radius_m)
+    velocity[~delivered[:, broken], broken] = HOME_GAIN * free[~delivered[:, broken]]
+    velocity[delivered[:, broken], broken] = 0.0
     aligned = np.linalg.norm(free, axis=1) <= ALIGNED_M
     speed = np.clip(GAIN * left, CRAWL_MPS, 1.0)
-    offset = position[rows, pusher] - position[:, broken]
-    across = offset - (offset * direction).sum(axis=1, keepdims=True) * direction
+    offset = position[rows, pusher] - here
+    along = (offset * direction).sum(axis=1, keepdims=True)
+    across = offset - along * direction
+    ready = aligned & (along[:, 0] < 0.0) & (np.linalg.norm(across, axis=1) <= LATERAL_M)
     shove = speed * direction - HOME_GAIN * across
-    drive = np.where((ready & aligned)[:, None], shove, drive)
-    open_ = ~delivered[:, broken] & (left[:, 0] > 0.5 * problem.radius_m)
-    velocity[rows[open_], pusher[open_]] = drive[open_]
-    velocity[open_, broken] = HOME_GAIN * free[open_]
+    for v in helpers:
+        _make_room(position, v, here, turn, problem.goals_m[broken], reach, wanted, velocity)
+        mine = wanted & (pusher == v)
+        velocity[mine, v] = _round(problem, position, v, spot)[mine]
+        velocity[mine & ready, v] = shove[mine & ready]
+
+
+def _make_room(
+    position: Array,
+    v: int,
+    here: Array,
+    turn: Array,
+    goal: Array,
+    reach_m: float,
+    wanted: Flags,
+    velocity: Array,
+) -> None:
+    """Vehicle `v` leaves the way of the broken one: from `here` to `turn` [E, 2] to its goal."""
+    for start, end in ((here, turn), (turn, np.broadcast_to(goal, turn.shape))):
+        away, distance = away_from_segment(position[:, v], start, end)
+        close = wanted & (distance < reach_m + ROOM_M)
+        velocity[close, v] = away[close]
