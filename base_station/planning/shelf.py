@@ -22,7 +22,7 @@ LOG = logging.getLogger("planner")
 
 KEPT = 200  # plans; the oldest go
 IRRELEVANT = {"host", "station_sysid", "station_seed", "origin"}  # to a plan; request has a seed
-IRRELEVANT_OF_VEHICLES = {"name", "mavlink_port"}
+IRRELEVANT_OF_VEHICLES = {"name", "mavlink_port", "connection"}
 IRRELEVANT_OF_PLANNING = {"workers", "reuse", "planning_sim_s"}
 
 

@@ -17,6 +17,7 @@ from base_station.planning.tasks.limits import clearance_m, closing_mps
 from base_station.steps.diagnosing import announced
 from base_station.twin import V_EAST, FleetModel, initial_state
 from hil.scenario import StationView
+from hil.scenario.station import Safety
 
 
 def limited(view: StationView, **manoeuvre) -> StationView:
@@ -138,3 +139,14 @@ def test_a_planner_keeps_to_a_speed_limit(rescue_view):
     assert answer.plan is not None
     assert answer.plan.prediction.contacts
     assert max(c.speed_mps for c in answer.plan.prediction.contacts) <= 0.6
+
+
+def test_where_vehicles_are_real_their_safety_limits_count_too(rescue_view):
+    problem = alpha_problem(rescue_view, experiment(rescue_view))
+    assert not problem.limits.any
+    gentle = rescue_view.model_copy(update={"safety": Safety(allow_contact=True)})
+    limits = alpha_problem(gentle, experiment(gentle)).limits
+    assert (limits.speed_mps, limits.margin_m) == (0.3, 0.5)
+    assert limits.may_touch.all()
+    apart = rescue_view.model_copy(update={"safety": Safety(allow_contact=False)})
+    assert not alpha_problem(apart, experiment(apart)).limits.may_touch.any()

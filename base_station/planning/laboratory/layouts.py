@@ -28,6 +28,7 @@ PUSHER_M = 0.9  # between a suspect's rim and the wall, so that somebody fits be
 NEAR_M, FAR_M = (1.1, 3.0), 4.0  # between centres
 AT_WALL_M = 0.15  # rim to wall, in the obstructed tier
 TRIES = 1000
+FIRST_PORT = 20_000  # no layout is ever connected to
 FAULTS = ("motor_x_off", "motor_y_off")  # by dead axis
 
 
@@ -149,7 +150,8 @@ def _peopled(base: StationView, goals: Array) -> StationView:
             update={
                 "name": f"rover_{k + 1}",
                 "sysid": k + 1,
-                "mavlink_port": first.mavlink_port + 10 * k,
+                "mavlink_port": FIRST_PORT + k,
+                "connection": None,
                 "goal": first.goal.model_copy(
                     update={"north_m": float(goal[0]), "east_m": float(goal[1])}
                 ),

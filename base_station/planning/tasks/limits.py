@@ -27,17 +27,19 @@ class Limits:
 
     @classmethod
     def of_view(cls, view: StationView, suspect: int) -> Self:
-        given, count = view.limits.manoeuvre, len(view.fleet)
-        may_touch = np.full((count, count), given.contacts == "any")
-        if given.contacts == "suspect":
+        """The scenario's, and where vehicles are real those of `view.safety`, too."""
+        given, safety, count = view.limits.manoeuvre, view.safety, len(view.fleet)
+        allowed = safety is None or safety.allow_contact
+        may_touch = np.full((count, count), given.contacts == "any" and allowed)
+        if given.contacts == "suspect" and allowed:
             may_touch[suspect, :] = may_touch[:, suspect] = True
         spared = [v for v, member in enumerate(view.fleet) if member.sysid in given.untouchable]
         may_touch[spared, :] = may_touch[:, spared] = False
         return cls(
-            given.contact_speed_mps or np.inf,
+            min(given.contact_speed_mps or np.inf, safety.contact_speed_mps if safety else np.inf),
             given.contact_impulse_ns or np.inf,
             may_touch,
-            given.wall_margin_m,
+            max(given.wall_margin_m, safety.fence_margin_m if safety else 0.0),
         )
 
     @property
