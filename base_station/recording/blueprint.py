@@ -5,6 +5,7 @@ from typing import Any
 
 import rerun.blueprint as rrb
 
+from base_station.hypotheses import UNKNOWN
 from base_station.recording.columns import SIM_TIME, WALL_TIME
 from base_station.recording.legend import MARGIN
 from base_station.recording.scene import hypotheses
@@ -115,8 +116,9 @@ def _close_up(view: StationView, *also: str) -> Any:
 def _space(view: StationView, title: str, contents: Sequence[str], eye: Any, trail_s: float) -> Any:
     shown_s = {"/trail": trail_s, "/truth/trail": trail_s}
     if TWINS in contents:
-        shown_s |= {f"/twins/{h}/trail": trail_s for h in hypotheses(view)}
-        shown_s |= {f"/twins/{h}/report": TUBE_S for h in hypotheses(view)}
+        twins = [h for h in hypotheses(view) if h != UNKNOWN]
+        shown_s |= {f"/twins/{h}/trail": trail_s for h in twins}
+        shown_s |= {f"/twins/{h}/report": TUBE_S for h in twins}
     shown_s["/truth/contacts"] = max(CONTACT_S, trail_s if trail_s == WHOLE_S else 0.0)
     return rrb.Spatial3DView(
         origin="/",

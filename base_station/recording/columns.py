@@ -23,11 +23,9 @@ class Kind:
 
 
 def _bodies(flat: NDArray[np.float64]) -> Any:
-    """A disc, and a line from its centre to its nose."""
-    centers, noses = flat[:, :3], flat[:, 3:]
-    strips = np.stack((centers, noses), axis=1)
-    discs, lines = rr.Cylinders3D.columns(centers=centers), rr.LineStrips3D.columns(strips=strips)
-    return rr.ComponentColumnList([*discs, *lines])
+    """A disc, and a dot at its nose: half the bytes of a line."""
+    discs = rr.Cylinders3D.columns(centers=flat[:, :3])
+    return rr.ComponentColumnList([*discs, *rr.Points3D.columns(positions=flat[:, 3:])])
 
 
 def _segments(flat: NDArray[np.float64]) -> Any:

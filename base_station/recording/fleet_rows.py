@@ -11,7 +11,9 @@ from base_station.records import Snapshot, VehicleSnapshot
 from hil.frames import body_to_ned, ned_to_wgs84
 from hil.scenario import StationView
 
+LINE_S = 0.2  # between rows of what is only drawn as a line
 SLOW_S = 1.0  # between rows of what hardly changes
+EARLY_S = 1e-6
 AHEAD_S = 2.0  # a set-point is drawn as the way it leads in this time
 
 
@@ -24,7 +26,7 @@ class FleetRows:
         self._reached_m = view.limits.goal_radius_m
         self._origin = view.origin.origin()
         self._trails = Trails()
-        self._slow_s = -math.inf
+        self._line_s = self._slow_s = -math.inf
         self._driven = False
         self._suspect: int | None = None
 
@@ -34,18 +36,15 @@ class FleetRows:
         self._series("residual/east", vehicles, lambda v: v.residual[1])
         self._series("alarm/north", vehicles, lambda v: v.cusum[0])
         self._series("alarm/east", vehicles, lambda v: v.cusum[1])
-        self._series("speed", vehicles, lambda v: math.hypot(*v.velocity_mps))
-        self._series("goal_distance", vehicles, self._goal_distance_m)
-        for vehicle in vehicles:
-            if vehicle.motor_outputs:
-                self._batch.add(f"/motors/{vehicle.name}", col.SCALARS, vehicle.motor_outputs)
-        slow = snapshot.time_s - self._slow_s >= SLOW_S
+        if snapshot.time_s - self._line_s >= LINE_S - EARLY_S:
+            self._line_s = snapshot.time_s
+            self._lines(vehicles)
+        slow = snapshot.time_s - self._slow_s >= SLOW_S - EARLY_S
         if slow:
             self._slow_s = snapshot.time_s
             self._slow(snapshot)
         if all(known(*v.reported_m) for v in vehicles):  # colours go by place in the fleet
             self._places(vehicles, slow)
-            self._batch.add("/focus", col.CAMERAS, self._focus(vehicles))
 
     def _focus(self, vehicles: Sequence[VehicleSnapshot]) -> scene.Point3:
         """What a close-up follows: whoever is or was the suspect, else the middle of the fleet."""
@@ -53,6 +52,16 @@ class FleetRows:
         shown = [v for v in vehicles if self._suspect in (None, v.sysid)]
         norths_m, easts_m = zip(*(v.reported_m for v in shown), strict=True)
         return scene.at(sum(norths_m) / len(shown), sum(easts_m) / len(shown), scene.CLOSE_M)
+
+    def _lines(self, vehicles: Sequence[VehicleSnapshot]) -> None:
+        self._series("speed", vehicles, lambda v: math.hypot(*v.velocity_mps))
+        self._series("goal_distance", vehicles, self._goal_distance_m)
+        for vehicle in vehicles:
+            if vehicle.motor_outputs:
+                outputs = [coarse(output) for output in vehicle.motor_outputs]
+                self._batch.add(f"/motors/{vehicle.name}", col.SCALARS, outputs)
+        if all(known(*v.reported_m) for v in vehicles):
+            self._batch.add("/focus", col.CAMERAS, self._focus(vehicles))
 
     def _slow(self, snapshot: Snapshot) -> None:
         self._series("battery", snapshot.vehicles, lambda v: v.battery_percent)
@@ -92,14 +101,14 @@ class FleetRows:
         value: Callable[[VehicleSnapshot], float],
     ) -> None:
         """NaN leaves a gap in a vehicle's line."""
-        self._batch.add(f"/{quantity}", col.SCALARS, [value(v) for v in vehicles])
+        self._batch.add(f"/{quantity}", col.SCALARS, [coarse(value(v)) for v in vehicles])
 
 
 def body(
     place_m: tuple[float, float], yaw_rad: float, radius_m: float, z_m: float
 ) -> tuple[float, ...]:
     """A row of `BODIES`; a heading that is not known points north."""
-    north, east = body_to_ned(radius_m, 0.0, yaw_rad if known(yaw_rad) else 0.0)
+    north, east = body_to_ned(scene.NOSE_AT * radius_m, 0.0, yaw_rad if known(yaw_rad) else 0.0)
     nose = scene.at(place_m[0] + north, place_m[1] + east, z_m + scene.DISC_M)
     return (*scene.at(*place_m, z_m), *nose)
 
@@ -110,3 +119,8 @@ def _ahead(north_mps: float, east_mps: float) -> scene.Point3:
 
 def known(*values: float) -> bool:
     return all(map(math.isfinite, values))
+
+
+def coarse(value: float) -> float:
+    """To a 512th of its unit: noise does not compress, zeros do."""
+    return round(value * 512.0) / 512.0 if known(value) else value

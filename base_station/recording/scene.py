@@ -30,6 +30,7 @@ from hil.scenario import Arena, StationView
 
 GROUND_Z_M, TRUTH_Z_M, TWIN_Z_M, REPORT_Z_M, PLAN_Z_M, ARROW_Z_M = 0.0, 0.03, 0.05, 0.06, 0.07, 0.1
 DISC_M = 0.02  # height
+NOSE_AT, NOSE_M = 0.7, 0.05  # of a body's radius from its middle; radius
 CLOSE_M, CLOSE_FOV_RAD = 3.4, 0.96  # the camera of the close-up: height above the plane, opening
 PER_VEHICLE = (
     *("residual/north", "residual/east", "alarm/north", "alarm/east"),
@@ -86,7 +87,7 @@ def style_bodies(
         line_radii=0.02,
     )
     stream.log(path, looks, static=True)
-    nose = rr.LineStrips3D.from_fields(colors=BLACK if solid else colors, radii=0.025)
+    nose = rr.Points3D.from_fields(colors=BLACK if solid else colors, radii=NOSE_M)
     stream.log(path, nose, static=True)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Hashable
 from base_station.recording.palette import Rgb
 from base_station.recording.scene import Point3
 
-STEP_M = 0.05  # a trail grows when its vehicle has moved this far: noise draws no scribble
+STEP_M = 0.1  # a trail grows when its vehicle has moved this far: noise draws no scribble
 
 
 class Trails:

@@ -1,5 +1,6 @@
 """What each hypothesis believes, tick by tick: its ghost fleet, its evidence, its posterior."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,6 +17,7 @@ from hil.scenario import StationView
 SIGMAS = 2.0  # half size of a spot
 MIN_SPOT_M = 0.03  # so that a certain prediction is still seen
 ELSEWHERE_M = 0.02  # a twin's report is drawn where it is off its body, or uncertain
+SLOW_S = 1.0  # between rows of the belief while there is no doubt
 FLOOR_NATS = -50.0  # further behind the best makes no difference
 
 
@@ -29,8 +31,9 @@ class TwinRows:
         self._trails = Trails()
         self._styled: set[str] = set()
         self._shown: tuple[TwinSnapshot, ...] = ()
+        self._told_s = -math.inf
 
-    def add(self, twins: Sequence[TwinSnapshot]) -> None:
+    def add(self, time_s: float, twins: Sequence[TwinSnapshot]) -> None:
         names = tuple(t.hypothesis for t in twins)
         for gone in sorted({t.hypothesis for t in self._shown} - set(names)):
             self._batch.add(f"/twins/{gone}/body", col.RINGS, ())
@@ -42,7 +45,8 @@ class TwinRows:
             scene.style_belief(self._stream, self._order)
         for twin in twins:
             self._ghosts(twin, doubted=len(twins) > 1)
-        if twins:
+        if twins and (len(twins) > 1 or time_s - self._told_s >= SLOW_S):
+            self._told_s = time_s
             self._belief(twins)
 
     def likeliest(self, count: int) -> tuple[str, ...]:

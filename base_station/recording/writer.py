@@ -39,7 +39,7 @@ class Writer:
         self._now_s = snapshot.time_s
         self._batch.tick(snapshot.time_s)
         self._fleet.add(snapshot)
-        self._twins.add(snapshot.twins)
+        self._twins.add(snapshot.time_s, snapshot.twins)
         for vehicle in snapshot.vehicles:
             self._state(vehicle.name, vehicle.phase)
         if self._state("fleet", snapshot.phase):

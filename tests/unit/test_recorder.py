@@ -3,18 +3,28 @@
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import recorder_fake_run as fake
 import rerun as rr
-from recorder_reading import entities, rows, temporal
+from recorder_reading import Rows, entities, rows, temporal
 from rerun.chunk import RrdReader
 
 from base_station.recorder import Recorder
-from base_station.recording.scene import hypotheses
+from base_station.recording.scene import NOSE_AT, hypotheses
 from base_station.records import Snapshot
 from hil.frames import wgs84_to_ned
+
+
+RESOLUTION = 1.0 / 512.0  # of what a vehicle's line shows, in its unit
+
+
+def at(found: Rows, time_s: float) -> Any:
+    """The row of a time."""
+    [value] = [v for t, v in found if t == pytest.approx(time_s)]
+    return value
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -71,29 +81,30 @@ def test_the_nose_points_where_the_vehicle_does(tmp_path: Path, story: list[Snap
     recorder = Recorder(tmp_path / "a.rrd", "demo", fake.view())
     recorder.snapshot(east)
     recorder.close()
-    [(_, strips)] = temporal(tmp_path / "a.rrd", "/fleet", "LineStrips3D:strips")
-    centre, nose = np.array(strips[0])
-    assert nose[:2] - centre[:2] == pytest.approx([0.3, 0.0], abs=1e-6)
+    [(_, centres)] = temporal(tmp_path / "a.rrd", "/fleet", "Cylinders3D:centers")
+    [(_, noses)] = temporal(tmp_path / "a.rrd", "/fleet", "Points3D:positions")
+    off_m = np.array(noses[0]) - np.array(centres[0])
+    assert off_m[:2] == pytest.approx([NOSE_AT * 0.3, 0.0], abs=1e-6)
 
 
 @pytest.mark.parametrize(
-    ("entity", "value"),
+    ("entity", "every", "value"),
     [
-        ("/residual/north", lambda v: v.residual[0]),
-        ("/residual/east", lambda v: v.residual[1]),
-        ("/alarm/north", lambda v: v.cusum[0]),
-        ("/alarm/east", lambda v: v.cusum[1]),
-        ("/speed", lambda v: np.hypot(*v.velocity_mps)),
+        ("/residual/north", 1, lambda v: v.residual[0]),
+        ("/residual/east", 1, lambda v: v.residual[1]),
+        ("/alarm/north", 1, lambda v: v.cusum[0]),
+        ("/alarm/east", 1, lambda v: v.cusum[1]),
+        ("/speed", 2, lambda v: np.hypot(*v.velocity_mps)),
     ],
 )
 def test_series_have_a_value_per_vehicle(
-    recording: Path, story: list[Snapshot], entity: str, value: object
+    recording: Path, story: list[Snapshot], entity: str, every: int, value: object
 ) -> None:
     assert callable(value)
     found = temporal(recording, entity, "Scalars:scalars")
-    assert [t for t, _ in found] == pytest.approx([s.time_s for s in story])
-    told = [[value(v) for v in s.vehicles] for s in story]
-    assert np.array([v for _, v in found]) == pytest.approx(np.array(told))
+    assert [t for t, _ in found] == pytest.approx([s.time_s for s in story[::every]])
+    told = [[value(v) for v in s.vehicles] for s in story[::every]]
+    assert np.array([v for _, v in found]) == pytest.approx(np.array(told), abs=RESOLUTION / 2)
     [(_, names)] = rows(recording, entity, "SeriesLines:names")
     assert names == ["rover_1", "rover_2", "rover_3"]
 
@@ -103,7 +114,8 @@ def test_slow_things_come_once_a_second(recording: Path, story: list[Snapshot]) 
     assert len(battery) == fake.END_S + 1
     time_s, charge = battery[7]
     told = next(s for s in story if s.time_s == time_s)
-    assert charge == [v.battery_percent for v in told.vehicles]
+    told_percent = [v.battery_percent for v in told.vehicles]
+    assert charge == pytest.approx(told_percent, abs=RESOLUTION / 2)
     assert temporal(recording, "/satellites", "Scalars:scalars")[0][1] == [14.0, 13.0, 12.0]
     threshold = temporal(recording, "/alarm/threshold", "Scalars:scalars")
     assert {v for _, v in threshold for v in v} == {fake.THRESHOLD}
@@ -111,7 +123,8 @@ def test_slow_things_come_once_a_second(recording: Path, story: list[Snapshot]) 
 
 def test_motors_have_names_and_outputs(recording: Path, story: list[Snapshot]) -> None:
     found = temporal(recording, "/motors/rover_2", "Scalars:scalars")
-    assert found[300][1] == pytest.approx(story[300].vehicles[1].motor_outputs)
+    told = story[300].vehicles[1].motor_outputs
+    assert at(found, 30.0) == pytest.approx(told, abs=RESOLUTION / 2)
     [(_, names)] = rows(recording, "/motors/rover_2", "SeriesLines:names")
     assert names[0] == "motor 1 (body x)"
     assert names[3] == "motor 4 (body y)"
@@ -121,7 +134,8 @@ def test_goal_distance_is_in_metres(recording: Path, story: list[Snapshot]) -> N
     found = temporal(recording, "/goal_distance", "Scalars:scalars")
     goal = fake.view().fleet[0].goal
     north, east = story[100].vehicles[0].reported_m
-    assert found[100][1][0] == pytest.approx(np.hypot(goal.north_m - north, goal.east_m - east))
+    told_m = np.hypot(goal.north_m - north, goal.east_m - east)
+    assert at(found, 10.0)[0] == pytest.approx(told_m, abs=RESOLUTION / 2)
 
 
 def test_map_is_wgs84(recording: Path, story: list[Snapshot]) -> None:
@@ -159,19 +173,28 @@ def test_posterior_and_evidence_per_hypothesis(recording: Path, story: list[Snap
     order = hypotheses(fake.view())
     [(_, names)] = rows(recording, "/belief/posterior", "SeriesLines:names")
     assert tuple(names) == order
-    index = 150
-    told = {t.hypothesis: t for t in story[index].twins}
-    posterior = temporal(recording, "/belief/posterior", "Scalars:scalars")[index][1]
-    evidence = temporal(recording, "/belief/log_likelihood", "Scalars:scalars")[index][1]
+    told = {t.hypothesis: t for t in story[150].twins}
+    posterior = at(temporal(recording, "/belief/posterior", "Scalars:scalars"), 15.0)
+    evidence = at(temporal(recording, "/belief/log_likelihood", "Scalars:scalars"), 15.0)
     for name, p, value in zip(order, posterior, evidence, strict=True):
         if name in told:
             assert p == told[name].posterior
             assert value == told[name].log_likelihood
     rest = 1.0 - sum(t.posterior for t in told.values())
     assert posterior[order.index("unknown")] == pytest.approx(rest)
-    behind = temporal(recording, "/belief/behind_best", "Scalars:scalars")[index][1]
+    behind = at(temporal(recording, "/belief/behind_best", "Scalars:scalars"), 15.0)
     assert np.nanmax(behind) == 0.0
     assert np.nanmin(behind) >= -50.0
+
+
+def test_without_a_doubt_the_belief_is_told_once_a_second(
+    recording: Path, story: list[Snapshot]
+) -> None:
+    times_s = [t for t, _ in temporal(recording, "/belief/posterior", "Scalars:scalars")]
+    doubted_s = [s.time_s for s in story if len(s.twins) > 1]
+    assert {round(t, 3) for t in doubted_s} <= {round(t, 3) for t in times_s}
+    sure_s = [t for t in times_s if t < doubted_s[0]]
+    assert np.diff(sure_s) == pytest.approx(1.0)
 
 
 def test_ghosts_come_and_go_with_the_doubt(recording: Path, story: list[Snapshot]) -> None:
