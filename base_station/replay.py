@@ -1,7 +1,7 @@
 """Recorded telemetry through the station's receiving side, detector, twins and diagnosis (pure).
 
-Nothing is planned and nothing is sent: the orders are those that were sent then. What the station
-would decide now is compared with what it decided.
+Nothing is planned and nothing is sent: the orders are those that were sent then, by this station or
+by others. What the station would decide now is compared with what it decided.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,6 +14,7 @@ import numpy as np
 from base_station import doubt as doubts
 from base_station.desk import Desk
 from base_station.execution import Orders
+from base_station.overheard import join, on_one_clock, others_drove
 from base_station.phases import (
     Concluding,
     Experimenting,
@@ -57,21 +58,39 @@ class Difference:
 
 
 def replay(view: StationView, frames: Iterable[Stamped]) -> tuple[Event, ...]:
-    """What the station decides, given the frames of all links in any order."""
+    """What the station decides, given the frames of all links in any order.
+
+    Where others drove, an event of kind 'end' says until when that could be followed.
+    """
     decoder = mavlink.Decoder()
     heard = [
         (time_us, message)
         for time_us, frame in sorted(frames, key=lambda stamped: stamped[0])
         for message in decoder.decode(frame)
     ]
-    index = {m.sysid: k for k, m in enumerate(view.fleet)}
+    if others_drove(view, heard):
+        heard = list(on_one_clock(view, heard))
+        following: _Following = _Overhearing(sent_orders(view, heard))
+        events = _watched(view, heard, Station(view, following.decide, join), 0.0)
+        return tuple(event for event in events if event.kind in (*DECISIONS, "end"))
+    following = _Following(sent_orders(view, heard))
     offset_us = _clock_offset_us(heard, view.station_sysid)
-    station = Station(view, _Following(sent_orders(view, heard)).decide)
+    events = _watched(view, heard, Station(view, following.decide), offset_us)
+    return tuple(event for event in events if event.kind in DECISIONS)
+
+
+def _watched(
+    view: StationView,
+    heard: Sequence[tuple[int, mavlink.Received]],
+    station: Station,
+    offset_us: float,
+) -> list[Event]:
+    index = {m.sysid: k for k, m in enumerate(view.fleet)}
     events: list[Event] = []
     for time_us, step in groupby(heard, key=lambda stamped: stamped[0]):
         received = [(index[m.sysid], m) for _, m in step if m.sysid in index]
         events += station.step((time_us - offset_us) / 1e6, received).events
-    return tuple(event for event in events if event.kind in DECISIONS)
+    return events
 
 
 def differences(then: Sequence[Event], now: Sequence[Event]) -> tuple[Difference, ...]:
@@ -93,10 +112,14 @@ class _Following:
     def __init__(self, sent: SentOrders) -> None:
         self._sent = sent
 
+    def moves(self, orders: Orders) -> bool:
+        """Whether anybody drives; this station rests in HOLD."""
+        return bool(orders.driven.any())
+
     def decide(self, desk: Desk, frame: Frame) -> Orders:
         """The orders sent at this tick; the phases follow them."""
         orders = self._sent.at(frame.time_s)
-        moving = bool(orders.driven.any())
+        moving = self.moves(orders)
         match desk.phase:
             case Probing() as phase:
                 own = probe(desk, phase, frame)
@@ -105,7 +128,7 @@ class _Following:
             case Settling() as phase:
                 settle(desk, phase, frame)
             case PlanningAlpha():
-                if self._sent.at(frame.time_s + desk.fleet.period_s).driven.any():
+                if self.moves(self._sent.at(frame.time_s + desk.fleet.period_s)):
                     desk.doubt = doubts.anchor(doubts.awake(desk.open_doubt), desk.mean_report_m())
                     desk.enter(Experimenting(_in_the_log(len(desk.view.fleet)), frame.time_s))
             case Experimenting(since_s=since_s):
@@ -119,6 +142,21 @@ class _Following:
             case _:
                 pass
         return orders
+
+
+class _Overhearing(_Following):
+    """Others may rest in GUIDED, drive on in spite of a doubt, and drive in ways unknown here."""
+
+    def moves(self, orders: Orders) -> bool:
+        return bool(orders.driven.any() and np.any(orders.setpoints[orders.driven, :2]))
+
+    def decide(self, desk: Desk, frame: Frame) -> Orders:
+        if not desk.ended and (unknown := self._sent.unknown(frame.time_s)):
+            who, why = unknown
+            desk.stop(f"{desk.view.fleet[who].name} {why}: what moves it is not in the log")
+        if isinstance(desk.phase, Settling) and self.moves(self._sent.at(frame.time_s)):
+            desk.enter(PlanningBeta(0))  # once more when they are at rest
+        return super().decide(desk, frame)
 
 
 def _in_the_log(vehicles: int) -> OpenLoopPlan:

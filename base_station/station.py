@@ -43,6 +43,7 @@ CONTACT_GAP_S = 1.0  # two touches of a pair closer in time than this are one
 
 
 Decide = Callable[[Desk, Frame], Orders]
+GetReady = Callable[[Desk, Commander], list[Command]]
 
 
 @dataclass(frozen=True)
@@ -58,12 +59,15 @@ class Outputs:
 class Station:
     """Drives one fleet through the paper's steps [0a]-[4]. `step` never blocks.
 
-    `decide` gives the orders of a tick and moves the phases on.
+    `decide` gives the orders of a tick and moves the phases on; `ready` makes the first tick
+    possible.
     """
 
-    def __init__(self, view: StationView, decide: Decide | None = None) -> None:
+    def __init__(
+        self, view: StationView, decide: Decide | None = None, ready: GetReady | None = None
+    ) -> None:
         self.desk = Desk(view)
-        self._decide = decide or own_decision
+        self._decide, self._get_ready = decide or own_decision, ready or self._arm_prepared
         self._commander = Commander(view)
         self.autopilots = self._commander.autopilots
         self._preparations = [
@@ -96,8 +100,7 @@ class Station:
         commands += self._keep_alive(wall_s)
         if isinstance(desk.phase, Connecting | Arming):
             commands += self._prepare(wall_s)
-            if all(p.done for p in self._preparations):
-                commands += get_ready(desk, self._commander)
+            commands += self._get_ready(desk, self._commander)
         for frame in desk.fleet.due() if desk.watching else ():
             commands += self._tick(frame)
             snapshots.append(snapshot(desk, frame))
@@ -110,6 +113,9 @@ class Station:
             for warning in preparation.warnings():
                 self.desk.say("link", warning)
         return commands
+
+    def _arm_prepared(self, desk: Desk, commander: Commander) -> list[Command]:
+        return get_ready(desk, commander) if all(p.done for p in self._preparations) else []
 
     def _note(self, index: int, message: mavlink.Received) -> None:
         desk, member = self.desk, self.desk.view.fleet[index]

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from base_station.planning.requests import OpenLoopPlan, PlanProgress, PlanRequest, PolicyWeights
 from hil.scenario import StationView
@@ -14,7 +15,10 @@ OnProgress = Callable[[PlanProgress], None]
 
 @dataclass(frozen=True)
 class Attempt:
-    """`accepted`: the target is met. `curve` rows are (timesteps, mean episode reward)."""
+    """`accepted`: the target is met. `curve` rows are (timesteps, mean episode reward).
+
+    `predicted_m` [K+1, V, 2] is where the policy takes the believed twin.
+    """
 
     accepted: bool
     timesteps: int
@@ -22,6 +26,7 @@ class Attempt:
     curve: tuple[tuple[float, float], ...]
     plan: OpenLoopPlan | None = None
     policy: PolicyWeights | None = None
+    predicted_m: NDArray[np.float64] | None = None
 
 
 Try = Callable[[StationView, PlanRequest, int, Progress], Attempt]  # the int is a seed

@@ -40,4 +40,5 @@ def plan(
     )
     if not done[-1].accepted:
         return PlanReady(request.number, request.kind, trainings)
-    return PlanReady(request.number, request.kind, trainings, done[-1].plan, done[-1].policy)
+    found = done[-1].plan, done[-1].policy, done[-1].predicted_m
+    return PlanReady(request.number, request.kind, trainings, *found)

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 def alpha_problem(view: StationView, request: PlanRequest) -> AlphaProblem:
     """The suspect waits in HOLD when the view says so; with free yaw, turning it is the better
     experiment, so then it may be commanded."""
-    model = FleetModel.from_view(view)
+    model = fenced(view)
     suspect = model.index(request.hypotheses[0].sysid)
     held = view.planning.suspect == "held" and view.yaw == "locked" and model.size > 1
     return AlphaProblem(
@@ -47,7 +47,7 @@ def objective_of(name: str, posterior: tuple[float, ...]) -> Objective:
 
 
 def beta_problem(view: StationView, request: PlanRequest) -> BetaProblem:
-    model, verdict = FleetModel.from_view(view), request.hypotheses[0]
+    model, verdict = fenced(view), request.hypotheses[0]
     faults, start = fault_rows(model, (verdict,)), request.states[0]
     paper = request.preset == "paper"
     return BetaProblem(
@@ -66,6 +66,12 @@ def beta_problem(view: StationView, request: PlanRequest) -> BetaProblem:
         shaped=not paper,
         curriculum=not paper,
     )
+
+
+def fenced(view: StationView) -> FleetModel:
+    """The fleet to plan with: a geofence counts as a wall, which no plan may touch."""
+    model = FleetModel.from_view(view)
+    return model.within(view.geofence) if view.geofence else model
 
 
 def blocked_directions(model: FleetModel, faults: FaultArrays, start: Array, v: int) -> Array:

@@ -118,6 +118,8 @@ class Training:
 class PlanReady:
     """The answer to a PlanRequest. Both plans are None when every restart missed its target.
 
+    `predicted_m` [K+1, V, 2] is where the believed twin goes under `policy` (north, east), one row
+    per control period of 1 / `control_hz`.
     `reused`: it was learned before, from the same; `trainings` are those of then.
     """
 
@@ -126,6 +128,7 @@ class PlanReady:
     trainings: tuple[Training, ...]
     plan: OpenLoopPlan | None = None
     policy: PolicyWeights | None = None
+    predicted_m: Array | None = None
     reused: bool = False
 
 
@@ -153,6 +156,8 @@ def decode(line: str) -> Message:
         fields["trainings"] = tuple(_training(t) for t in fields["trainings"])
         fields["plan"] = _plan(fields["plan"])
         fields["policy"] = _policy(fields["policy"])
+        if fields["predicted_m"] is not None:
+            fields["predicted_m"] = _array(fields["predicted_m"])
     message: Message = _TYPES[tree["type"]](**fields)
     return message
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from base_station.planning.actors import Actor, Gaussian
 from base_station.planning.attempts import Attempt, Progress, Try
+from base_station.planning.foresight import way
 from base_station.planning.learning.discrete import command_list
 from base_station.planning.learning.dqn import learn_dqn
 from base_station.planning.learning.lesson import Learned, Lesson
@@ -89,7 +90,8 @@ def learn_beta(view: StationView, request: PlanRequest, seed: int, progress: Pro
     done = train(Lesson(task, preset, seed, target, partial(_forward, progress, preset)))
     assert isinstance(done.actor, Gaussian)
     took = done.accepted, done.timesteps, done.wall_s, done.curve
-    return Attempt(*took, policy=done.actor.weights)
+    weights = done.actor.weights
+    return Attempt(*took, policy=weights, predicted_m=way(problem, weights))
 
 
 def preset_of(request: PlanRequest) -> Preset:

@@ -13,7 +13,7 @@ from hil.scenario import Arena, StationView
 
 TABS = ("Overview", "Diagnosis", "Learning", "Mission", "Map", "Log")
 REALITY = ("/plane/**", "/fleet", "/trail", "/setpoint", "/truth/**")
-TWINS, PLAN = "/twins/**", "/plan/**"
+TWINS, PLAN, ALPHA, BETA = "/twins/**", "/plan/**", "/plan/alpha/**", "/plan/beta"
 PREDICTED = ("/plane/**", "- /plane/legend/**", "/fleet", PLAN)
 DARK, GRID = (14, 16, 20), (255, 255, 255, 12)
 SHORT_S, CLOSE_TRAIL_S, TUBE_S, CONTACT_S, WHOLE_S = 15.0, 5.0, 1.5, 3.0, 24 * 3600.0
@@ -49,7 +49,7 @@ def _overview(view: StationView) -> Any:
 
 
 def _diagnosis(view: StationView) -> Any:
-    left = rrb.Vertical(_close_up(view, PLAN), _phases(), row_shares=[5, 3])
+    left = rrb.Vertical(_close_up(view, ALPHA), _phases(), row_shares=[5, 3])
     right = rrb.Vertical(
         _posterior(legend=True),
         _plot("Evidence lost to the best (nats; -4.6 is 1 : 100)", "/belief/behind_best"),
@@ -63,12 +63,12 @@ def _diagnosis(view: StationView) -> Any:
 def _learning(view: StationView) -> Any:
     over_time = rrb.Vertical(*(_curves(kind) for kind in ("alpha", "beta")))
     over_steps = rrb.Vertical(*(_bars(kind) for kind in ("alpha", "beta")))
-    plan = _plane(view, "Plan alpha, predicted", PREDICTED, aspect=0.8)
+    plan = _plane(view, "Plan, as predicted", PREDICTED, aspect=0.8)
     return rrb.Horizontal(over_time, over_steps, plan, column_shares=[1, 1, 1.3], name="Learning")
 
 
 def _mission(view: StationView) -> Any:
-    plane = _plane(view, "Mission", REALITY, WHOLE_S)
+    plane = _plane(view, "Mission", (*REALITY, BETA), WHOLE_S)
     motors = [
         _plot(f"Motors {m.name} (-1 to 1)", f"/motors/{m.name}", legend=True)
         for m in view.fleet[:MOTOR_TABS]

@@ -18,6 +18,7 @@ LEGEND = """\
 | coloured ellipse | what the station would then **receive**, two standard deviations wide |
 | white arrow | where its orders would take it in 2 s |
 | circle with a dot | goal, and how near counts as reached |
+| dashed line | the geofence, if there is one: no plan leaves it |
 
 One colour per vehicle and one per hypothesis, the same in all views. Broken motors are
 orange and red, a stuck GPS is purple and blue, nothing wrong is grey.

@@ -1,48 +1,61 @@
-"""Learning curves, and what each hypothesis predicts for a plan."""
+"""Learning curves, and what is expected of a plan before it is driven."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 
 from base_station.planning.requests import OpenLoopPlan, PlanProgress, PlanReady, Training
 from base_station.recording import columns as col
 from base_station.recording import palette, scene
 
-PLAN_SHOWN_IN = ("plan_alpha", "experiment", "plan_beta")
+ALPHA_SHOWN_IN = ("plan_alpha", "experiment", "plan_beta")
+BETA_SHOWN_IN = ("plan_beta", "mission", "return", "done")
+Array = NDArray[np.float64]
+
 LAYER_M = 0.003  # between the lines of two hypotheses
 
 
 class LearningRows:
-    """Curves are /learning/<kind>/<number>/attempt_<k>; the caller has set the time."""
+    """Curves are /learning/<kind>/<number>/attempt_<k>; the caller has set the time.
 
-    def __init__(self, stream: Any) -> None:
+    Plans are /plan/alpha/<hypothesis> and /plan/beta.
+    """
+
+    def __init__(self, stream: Any, vehicles: int) -> None:
         self._stream = stream
+        self._colors = [palette.vehicle_color(k) for k in range(vehicles)]
         self._request = "plan/0"
-        self._styled: set[str] = set()
-        self._drawn: tuple[str, ...] = ()
+        self._told_steps: dict[str, int] = {}
+        self._drawn: dict[str, Sequence[str]] = {}  # plan, and the phases it is shown in
 
     def progress(self, progress: PlanProgress) -> None:
-        """A curve as it grows, over time."""
+        """A curve as it grows, over time and over steps."""
         self._request = f"{progress.kind}/{progress.number}"
         path = f"/learning/{self._request}/attempt_{progress.attempt}"
-        if path not in self._styled:
+        if path not in self._told_steps:
             self._style(path, progress.attempt, "running", palette.RUNNING)
+        self._told_steps[path] = progress.timesteps
+        self._stream.set_time(col.TRAINING_STEPS, sequence=progress.timesteps)
         self._stream.log(path, rr.Scalars(progress.mean_reward))
+        self._stream.disable_timeline(col.TRAINING_STEPS)
 
     def training(self, training: Training) -> None:
         """A whole curve, over steps, in the colour of what became of it."""
         place = f"{self._request}/attempt_{training.attempt}"
         outcome = "accepted" if training.accepted else "rejected"
         color = palette.ACCEPTED if training.accepted else palette.REJECTED
-        self._style(f"/learning/{place}", training.attempt, f"{training.planner}, {outcome}", color)
+        path = f"/learning/{place}"
+        self._style(path, training.attempt, f"{training.planner}, {outcome}", color)
         if not training.curve:
             return
         steps, rewards = np.array(training.curve, dtype=np.float64).T
-        index = rr.TimeColumn(col.TRAINING_STEPS, sequence=steps.astype(np.int64))
-        values = rr.Scalars.columns(scalars=rewards)
-        self._stream.send_columns(f"/learning/{place}", indexes=[index], columns=values)
+        if (new := steps > self._told_steps.get(path, -1)).any():
+            index = rr.TimeColumn(col.TRAINING_STEPS, sequence=steps[new].astype(np.int64))
+            values = rr.Scalars.columns(scalars=rewards[new])
+            self._stream.send_columns(path, indexes=[index], columns=values)
         widths = np.diff(steps, prepend=0.0)
         bars = rr.BarChart(rewards, abscissa=steps - widths / 2, widths=widths, color=color)
         self._stream.log(f"/curves/{outcome}/{place}", bars)
@@ -53,30 +66,42 @@ class LearningRows:
         for training in ready.trainings:
             self.training(training)
         if ready.plan is not None:
-            self._draw(ready.plan, hypotheses)
+            self._draw_alpha(ready.plan, hypotheses)
+        if ready.predicted_m is not None:
+            self._draw_beta(ready.predicted_m)
 
     def phase(self, phase: str) -> None:
         """A plan that is over is taken off the plane."""
-        if self._drawn and phase not in PLAN_SHOWN_IN:
-            for name in self._drawn:
-                self._stream.log(f"/plan/{name}", rr.LineStrips3D([]))
-            self._drawn = ()
+        for path in [path for path, phases in self._drawn.items() if phase not in phases]:
+            self._stream.log(path, rr.LineStrips3D([]))
+            del self._drawn[path]
 
-    def _draw(self, plan: OpenLoopPlan, hypotheses: Sequence[str]) -> None:
+    def _draw_alpha(self, plan: OpenLoopPlan, hypotheses: Sequence[str]) -> None:
+        """What each twin expects to be reported."""
         reports_m = plan.predicted_reports
         names = tuple(hypotheses)
         if len(names) != len(reports_m):
             names = tuple(f"hypothesis_{k}" for k in range(len(reports_m)))
         for k, (name, report_m) in enumerate(zip(names, reports_m, strict=True)):
-            z_m = scene.PLAN_Z_M + LAYER_M * k
-            paths_m = report_m.transpose(1, 0, 2).tolist()
-            strips = [[scene.at(n, e, z_m) for n, e in path] for path in paths_m]
+            strips = _strips(report_m, scene.PLAN_Z_M + LAYER_M * k)
             color = palette.hypothesis_color(name)
-            self._stream.log(f"/plan/{name}", rr.LineStrips3D(strips, colors=color, radii=0.02))
-        self._drawn = names
+            path = f"/plan/alpha/{name}"
+            self._stream.log(path, rr.LineStrips3D(strips, colors=color, radii=0.02))
+            self._drawn[path] = ALPHA_SHOWN_IN
+
+    def _draw_beta(self, predicted_m: Array) -> None:
+        """Where the believed twin goes under the policy, in the colours of the vehicles."""
+        strips = _strips(predicted_m, scene.PLAN_Z_M)
+        self._stream.log("/plan/beta", rr.LineStrips3D(strips, colors=self._colors, radii=0.015))
+        self._drawn["/plan/beta"] = BETA_SHOWN_IN
 
     def _style(self, path: str, attempt: int, outcome: str, color: palette.Rgb) -> None:
-        self._styled.add(path)
         name = f"attempt {attempt + 1}: {outcome}"
         style = rr.SeriesLines(names=name, colors=color, widths=2.0)
         self._stream.log(path, style, static=True)
+
+
+def _strips(places_m: Array, z_m: float) -> list[list[scene.Point3]]:
+    """A line per vehicle, of places [K, V, 2] (north, east)."""
+    paths_m = places_m.transpose(1, 0, 2).tolist()
+    return [[scene.at(north, east, z_m) for north, east in path] for path in paths_m]

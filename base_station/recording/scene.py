@@ -6,6 +6,7 @@ lie a few centimetres above each other.
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import rerun as rr
@@ -26,10 +27,11 @@ from base_station.recording.palette import (
 )
 from hil.airframe import Airframe
 from hil.frames import ned_to_wgs84
-from hil.scenario import Arena, StationView
+from hil.scenario import Rectangle, StationView
 
 GROUND_Z_M, TRUTH_Z_M, TWIN_Z_M, REPORT_Z_M, PLAN_Z_M, ARROW_Z_M = 0.0, 0.03, 0.05, 0.06, 0.07, 0.1
 DISC_M = 0.02  # height
+DASH_M = 0.2
 NOSE_AT, NOSE_M = 0.7, 0.05  # of a body's radius from its middle; radius
 CLOSE_M, CLOSE_FOV_RAD = 3.4, 0.96  # the camera of the close-up: height above the plane, opening
 PER_VEHICLE = (
@@ -64,6 +66,9 @@ def log_scene(stream: Any, view: StationView) -> None:
     stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     outline = rr.LineStrips3D([_outline(view.arena)], colors=DIM, radii=0.02)
     stream.log("/plane/arena", outline, static=True)
+    if view.geofence:
+        dashes = rr.LineStrips3D(_dashes(view.geofence), colors=LIGHT_GREY, radii=0.015)
+        stream.log("/plane/geofence", dashes, static=True)
     _log_goals(stream, view)
     _style_fleet(stream, view)
     style_belief(stream, hypotheses(view))
@@ -151,10 +156,33 @@ def _log_map(stream: Any, view: StationView) -> None:
     stream.log("/map/goals", rr.GeoPoints(lat_lon=goals, colors=colors, radii=-9.0), static=True)
     lines = rr.GeoLineStrings(lat_lon=[outline], colors=LIGHT_GREY, radii=-1.0)
     stream.log("/map/arena", lines, static=True)
+    if view.geofence:
+        fence = [
+            [ned_to_wgs84(north, east, origin) for east, north, _ in dash]
+            for dash in _dashes(view.geofence)
+        ]
+        dashed = rr.GeoLineStrings(lat_lon=fence, colors=LIGHT_GREY, radii=-1.0)
+        stream.log("/map/geofence", dashed, static=True)
 
 
-def _outline(arena: Arena) -> list[Point3]:
-    north, east = (arena.north_min_m, arena.north_max_m), (arena.east_min_m, arena.east_max_m)
+def _dashes(area: Rectangle) -> list[list[Point3]]:
+    """Its outline in dashes of `DASH_M`, with gaps as long."""
+    dashes = []
+    for (east, north, z_m), (east_end, north_end, _) in pairwise(_outline(area)):
+        count = max(1, round(math.hypot(east_end - east, north_end - north) / DASH_M / 2))
+        for k in range(count):
+            shares = (k / count, (k + 0.5) / count)
+            dashes.append(
+                [
+                    at(north + s * (north_end - north), east + s * (east_end - east), z_m)
+                    for s in shares
+                ]
+            )
+    return dashes
+
+
+def _outline(area: Rectangle) -> list[Point3]:
+    north, east = (area.north_min_m, area.north_max_m), (area.east_min_m, area.east_max_m)
     corners = ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))
     return [at(north[n], east[e]) for n, e in corners]
 

@@ -17,7 +17,8 @@ from hil.scenario import StationView
 SIGMAS = 2.0  # half size of a spot
 MIN_SPOT_M = 0.03  # so that a certain prediction is still seen
 ELSEWHERE_M = 0.02  # a twin's report is drawn where it is off its body, or uncertain
-SLOW_S = 1.0  # between rows of the belief while there is no doubt
+SLOW_S = 0.5  # between rows of the belief while there is no doubt
+EARLY_S = 1e-6
 FLOOR_NATS = -50.0  # further behind the best makes no difference
 
 
@@ -45,7 +46,7 @@ class TwinRows:
             scene.style_belief(self._stream, self._order)
         for twin in twins:
             self._ghosts(twin, doubted=len(twins) > 1)
-        if twins and (len(twins) > 1 or time_s - self._told_s >= SLOW_S):
+        if twins and (len(twins) > 1 or time_s - self._told_s >= SLOW_S - EARLY_S):
             self._told_s = time_s
             self._belief(twins)
 

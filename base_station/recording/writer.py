@@ -26,7 +26,7 @@ class Writer:
         self._batch = Batch(stream, period_s)
         self._fleet = FleetRows(self._batch, view)
         self._twins = TwinRows(self._batch, stream, view)
-        self._learning = LearningRows(stream)
+        self._learning = LearningRows(stream, len(view.fleet))
         self._brief = Brief(run_id, view)
         self._states: dict[str, str] = {}
         self._now_s = 0.0

@@ -23,12 +23,13 @@ def get_ready(desk: Desk, commander: Commander) -> list[Command]:
     commands += commander.arm(tracks, desk.time_s)
     if commander.all_holding(tracks):
         desk.fleet.start_ticks()
-        desk.watch = _fresh_watch(desk)
+        desk.watch = fresh_watch(desk)
         desk.enter(Probing(desk.time_s))
     return commands
 
 
-def _fresh_watch(desk: Desk) -> Watch:
+def fresh_watch(desk: Desk) -> Watch:
+    """The believed twin, at rest where the vehicles say they are."""
     newest = [t.samples[-1] for t in desk.fleet.tracks]
     state = twin.initial_state(
         [s.position_m for s in newest], [t.status.yaw_rad for t in desk.fleet.tracks]

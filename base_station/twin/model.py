@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from base_station.hypotheses import Hypothesis
 from hil.airframe import Airframe
 from hil.faults import NED_AXES, Type, Unit
-from hil.scenario import StationView
+from hil.scenario import Rectangle, StationView
 
 Array = NDArray[np.float64]
 
@@ -78,7 +78,6 @@ class FleetModel:
     def from_view(cls, view: StationView) -> Self:
         frames = [member.frame for member in view.fleet]
         motors = max(len(f.motors) for f in frames)
-        arena = view.arena
         vehicles = Vehicles(
             radius_m=np.array([f.radius_m for f in frames]),
             speed_limit_mps=np.array([f.speed_limit_mps for f in frames]),
@@ -93,9 +92,7 @@ class FleetModel:
             axis_rolling=np.array(
                 [[_axis_rolling(f, axis) for axis in ("x", "y")] for f in frames]
             ),
-            bounds_m=np.array(
-                [arena.north_min_m, arena.north_max_m, arena.east_min_m, arena.east_max_m]
-            ),
+            bounds_m=_bounds_m(view.arena),
             yaw_locked=view.yaw == "locked",
             dt_s=1.0 / view.clock.autopilot_hz,
         )
@@ -110,6 +107,10 @@ class FleetModel:
             latency_s=np.zeros(1),
         )
         return cls(tuple(member.sysid for member in view.fleet), vehicles, nominal)
+
+    def within(self, area: Rectangle) -> Self:
+        """The same fleet with walls around `area`."""
+        return replace(self, vehicles=self.vehicles._replace(bounds_m=_bounds_m(area)))
 
     @property
     def size(self) -> int:
@@ -163,6 +164,10 @@ def fault_rows(model: FleetModel, hypotheses: Sequence[Hypothesis]) -> FaultArra
         else:
             raise ValueError(f"hypothesis {hypothesis.name!r}: no twin for {fault}")
     return FaultArrays(power, stuck)
+
+
+def _bounds_m(area: Rectangle) -> Array:
+    return np.array([area.north_min_m, area.north_max_m, area.east_min_m, area.east_max_m])
 
 
 def _padded(rows: Sequence[object], length: int, fill: float = 0.0) -> Array:

@@ -26,26 +26,30 @@ Learn = Callable[[StationView, PlanRequest, Callable[[PlanProgress], None]], Pla
 
 
 class InlinePlanner:
-    """Plans at once, delivers after the declared simulation time. Requests travel as JSON, too."""
+    """Plans at once, delivers after the declared simulation time, and progress on the way there.
+
+    Requests travel as JSON, too.
+    """
 
     def __init__(self, view: StationView, learn: Learn) -> None:
         self._view, self._learn = view, learn
-        self._ready: list[tuple[float, PlanReady]] = []
-        self._progress: list[PlanProgress] = []
+        self._due: list[tuple[float, PlanProgress | PlanReady]] = []
         self.time_s = 0.0
 
     def submit(self, request: PlanRequest) -> None:
         received = decode(encode(request))
         assert isinstance(received, PlanRequest)
-        answer = decode(encode(self._learn(self._view, received, self._progress.append)))
+        progress: list[PlanProgress] = []
+        answer = decode(encode(self._learn(self._view, received, progress.append)))
         assert isinstance(answer, PlanReady)
-        self._ready.append((self.time_s + self._view.planning.planning_sim_s, answer))
+        messages: list[PlanProgress | PlanReady] = [*progress, answer]
+        step_s = self._view.planning.planning_sim_s / len(messages)
+        for k, message in enumerate(messages, start=1):
+            self._due.append((self.time_s + k * step_s, message))
 
     def poll(self) -> list[PlanProgress | PlanReady]:
-        due: list[PlanProgress | PlanReady] = [*self._progress]
-        self._progress.clear()
-        due += [answer for at_s, answer in self._ready if at_s <= self.time_s + 1e-9]
-        self._ready = [entry for entry in self._ready if entry[0] > self.time_s + 1e-9]
+        due = [message for at_s, message in self._due if at_s <= self.time_s + 1e-9]
+        self._due = [entry for entry in self._due if entry[0] > self.time_s + 1e-9]
         return due
 
 

@@ -19,7 +19,18 @@ from hil.scenario.mission import (
     Priors,
 )
 from hil.scenario.periods import Period, in_effect
-from hil.scenario.places import Arena, Clock, OriginModel, Patch, Point, Slope, Terrain, Wind
+from hil.scenario.places import (
+    Arena,
+    Clock,
+    Geofence,
+    OriginModel,
+    Patch,
+    Point,
+    Rectangle,
+    Slope,
+    Terrain,
+    Wind,
+)
 from hil.scenario.schema import Scenario
 from hil.scenario.station import STATION_AIRFRAMES, FleetMember, Safety, StationView, station_view
 from hil.scenario.vehicles import Plant, Radio, Sensors, Vehicle
@@ -37,6 +48,7 @@ __all__ = [
     "FleetFile",
     "FleetMember",
     "FleetVehicle",
+    "Geofence",
     "GoalOutcome",
     "Limits",
     "Links",
@@ -49,6 +61,7 @@ __all__ = [
     "Point",
     "Priors",
     "Radio",
+    "Rectangle",
     "Safety",
     "Scenario",
     "Sensors",

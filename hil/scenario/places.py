@@ -19,8 +19,8 @@ class OriginModel(Model):
         return Origin(self.lat_deg, self.lon_deg, self.alt_m)
 
 
-class Arena(Model):
-    """A rectangle with solid walls."""
+class Rectangle(Model):
+    """A part of the plane, along north and east."""
 
     north_min_m: Metres
     north_max_m: Metres
@@ -30,7 +30,8 @@ class Arena(Model):
     @model_validator(mode="after")
     def _has_an_inside(self) -> Self:
         if self.north_min_m >= self.north_max_m or self.east_min_m >= self.east_max_m:
-            raise ValueError("the arena is empty: each *_min_m must be below its *_max_m")
+            what = type(self).__name__.lower()
+            raise ValueError(f"the {what} is empty: each *_min_m must be below its *_max_m")
         return self
 
     def contains(self, point: "Point", margin_m: float = 0.0) -> bool:
@@ -38,6 +39,14 @@ class Arena(Model):
             self.north_min_m + margin_m <= point.north_m <= self.north_max_m - margin_m
             and self.east_min_m + margin_m <= point.east_m <= self.east_max_m - margin_m
         )
+
+
+class Arena(Rectangle):
+    """It has solid walls."""
+
+
+class Geofence(Rectangle):
+    """No plan leaves it, though no wall is there. It is not uploaded to the vehicles."""
 
 
 class Point(Model):
@@ -79,7 +88,7 @@ class Slope(Period):
     east: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
 
 
-class Patch(Arena, Period):
+class Patch(Rectangle, Period):
     """A rectangle where rolling resistance and grip are multiplied by `friction`."""
 
     friction: Annotated[float, Field(ge=0, le=20)]

@@ -8,7 +8,7 @@ from hil import airframe as airframes
 from hil.airframe import Airframe
 from hil.connection import Connection, parse_connection
 from hil.errors import InputError
-from hil.scenario.checks import keep_inside, unique
+from hil.scenario.checks import check_fence, keep_inside, unique
 from hil.scenario.fields import (
     PORTS_PER_VEHICLE,
     AutopilotName,
@@ -24,7 +24,7 @@ from hil.scenario.fields import (
     VehicleName,
 )
 from hil.scenario.mission import Diagnosis, Limits, Planning
-from hil.scenario.places import Arena, Clock, OriginModel, Point
+from hil.scenario.places import Arena, Clock, Geofence, OriginModel, Point
 from hil.scenario.schema import Scenario
 from hil.scenario.vehicles import Sensors
 
@@ -75,6 +75,7 @@ class StationView(Model):
 
     origin: OriginModel
     arena: Arena
+    geofence: Geofence | None = None
     yaw: Literal["locked", "free"]
     clock: Clock
     fleet: Annotated[tuple[FleetMember, ...], Field(min_length=1, max_length=100)]
@@ -97,6 +98,7 @@ class StationView(Model):
         if self.station_sysid in sysids:
             raise ValueError(f"station_sysid = {self.station_sysid} is also a vehicle's")
         keep_inside(self.arena, "goal", self.fleet)
+        check_fence(self.geofence, self.arena, ("goal",), self.fleet)
         return self
 
     def connection_of(self, member: FleetMember) -> Connection:
@@ -141,6 +143,7 @@ def station_view(scenario: Scenario, mavlink_port_base: int, station_seed: int) 
     return StationView(
         origin=scenario.origin,
         arena=scenario.arena,
+        geofence=scenario.geofence,
         yaw=scenario.yaw,
         clock=scenario.clock,
         fleet=fleet,

@@ -74,7 +74,8 @@ def test_every_entity_of_the_run_is_there(rrd: Path, rescued: Scenario) -> None:
     expected |= {f"/motors/{v.name}" for v in rescued.fleet}
     for twin in ("none", "motor_y_off", "gps_east_stuck"):
         expected |= {f"/twins/{twin}/{part}" for part in ("body", "trail")}
-    expected |= {"/plan/motor_y_off", "/plan/gps_east_stuck", "/plane/arena", "/plane/goals"}
+    expected |= {"/plan/alpha/motor_y_off", "/plan/alpha/gps_east_stuck", "/plan/beta"}
+    expected |= {"/plane/arena", "/plane/goals", "/map/arena"}
     expected |= {f"/truth/{part}" for part in ("fleet", "trail", "contacts", "faults")}
     found = entities(rrd)
     assert expected <= found

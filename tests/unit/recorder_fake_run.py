@@ -249,7 +249,9 @@ def plan_alpha() -> PlanReady:
 
 
 def plan_beta() -> PlanReady:
-    return PlanReady(2, "beta", (Training("ppo-mlp", "tuned", 0, True, 40_000, 7.6, curve(97.0)),))
+    training = Training("ppo-mlp", "tuned", 0, True, 40_000, 7.6, curve(97.0))
+    predicted_m = np.array([truth_at(t) for t in np.arange(29.0, 52.0, 0.5)])
+    return PlanReady(2, "beta", (training,), predicted_m=predicted_m)
 
 
 def contacts() -> list[tuple[float, tuple[str, str], tuple[float, float], float]]:

@@ -11,6 +11,8 @@ from base_station.planning.problems import alpha_problem, beta_problem
 from base_station.planning.tasks.alpha import AlphaTask
 from base_station.planning.tasks.beta import BetaTask
 from base_station.planning.tasks.environments import AlphaEnv, BetaEnv
+from base_station.twin import FleetModel
+from hil.scenario import Geofence
 
 TERMS = {
     "paper_distance": {"distance", "wall"},
@@ -84,3 +86,13 @@ def test_each_term_is_what_its_name_says(rescue_view):
     assert sum(t["contact"] for t in pushing) < 0.0
     assert sum(t["energy"] for t in pushing) < 0.0
     assert pushing[-1]["time"] > -0.01  # nothing left to know
+
+
+def test_plans_keep_inside_the_geofence_though_no_wall_is_there(rescue_view):
+    fence = Geofence(north_min_m=-3.0, north_max_m=4.0, east_min_m=-4.0, east_max_m=4.5)
+    view = rescue_view.model_copy(update={"geofence": fence})
+    bounds_m = [-3.0, 4.0, -4.0, 4.5]
+    assert alpha_problem(view, experiment(view)).model.vehicles.bounds_m.tolist() == bounds_m
+    assert beta_problem(view, asked(view, "beta")).model.vehicles.bounds_m.tolist() == bounds_m
+    believed = FleetModel.from_view(view).vehicles.bounds_m
+    assert believed.tolist() == FleetModel.from_view(rescue_view).vehicles.bounds_m.tolist()

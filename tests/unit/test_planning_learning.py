@@ -9,6 +9,7 @@ import pytest
 from base_station.hypotheses import candidates, nominal
 from base_station.planning.actors import Gaussian
 from base_station.planning.attempts import derived_seed
+from base_station.planning.foresight import way
 from base_station.planning.learning.lesson import Lesson
 from base_station.planning.learning.ppo import train
 from base_station.planning.learning.presets import PRESETS, TUNED_ALPHA
@@ -205,6 +206,14 @@ def test_a_healthy_fleet_learns_to_deliver_where_standing_still_does_not(rescue_
     assert success_share(problem, answer.policy, rng, 64) >= 0.9
     task = BetaTask(problem, 1, np.random.default_rng(0))
     assert success_share(problem, zero_policy(task), rng, 8) == 0.0
+    foreseen_m = answer.predicted_m
+    assert foreseen_m is not None
+    assert foreseen_m[0] == pytest.approx(asked.states[0, :, NORTH : EAST + 1])
+    nearest_m = np.linalg.norm(foreseen_m - problem.goals_m, axis=2).min(axis=0)
+    assert (nearest_m <= problem.radius_m).all()
+    standing_m = way(problem, zero_policy(task))
+    assert len(standing_m) == problem.steps + 1
+    assert np.ptp(standing_m, axis=0) == pytest.approx(0.0, abs=0.01)
 
 
 def test_without_a_push_no_drive_of_its_own_brings_the_broken_rover_home(rescue_view):

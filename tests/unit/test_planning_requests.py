@@ -81,6 +81,7 @@ READIES = st.builds(
     st.lists(TRAININGS, max_size=2).map(tuple),
     st.one_of(st.none(), PLANS),
     st.one_of(st.none(), POLICIES),
+    st.one_of(st.none(), arrays(3, 2, 2)),
 )
 PROGRESSES = st.builds(
     PlanProgress,

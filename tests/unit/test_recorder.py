@@ -13,10 +13,13 @@ from recorder_reading import Rows, entities, rows, temporal
 from rerun.chunk import RrdReader
 
 from base_station.recorder import Recorder
+from base_station.recording.merge import merge
 from base_station.recording.scene import NOSE_AT, hypotheses
+from base_station.recording.truth import TruthRecorder
 from base_station.records import Snapshot
+from benchmarks import recorder as crowd
 from hil.frames import wgs84_to_ned
-
+from hil.scenario import Geofence
 
 RESOLUTION = 1.0 / 512.0  # of what a vehicle's line shows, in its unit
 
@@ -187,14 +190,14 @@ def test_posterior_and_evidence_per_hypothesis(recording: Path, story: list[Snap
     assert np.nanmin(behind) >= -50.0
 
 
-def test_without_a_doubt_the_belief_is_told_once_a_second(
+def test_without_a_doubt_the_belief_is_told_twice_a_second(
     recording: Path, story: list[Snapshot]
 ) -> None:
     times_s = [t for t, _ in temporal(recording, "/belief/posterior", "Scalars:scalars")]
     doubted_s = [s.time_s for s in story if len(s.twins) > 1]
     assert {round(t, 3) for t in doubted_s} <= {round(t, 3) for t in times_s}
     sure_s = [t for t in times_s if t < doubted_s[0]]
-    assert np.diff(sure_s) == pytest.approx(1.0)
+    assert np.diff(sure_s) == pytest.approx(0.5)
 
 
 def test_ghosts_come_and_go_with_the_doubt(recording: Path, story: list[Snapshot]) -> None:
@@ -268,9 +271,67 @@ def test_plan_alpha_is_drawn_per_hypothesis_until_the_mission(recording: Path) -
     assert plan is not None
     for k, name in enumerate(fake.NAMES):
         (drawn_s, strips), (cleared_s, nothing) = temporal(
-            recording, f"/plan/{name}", "LineStrips3D:strips"
+            recording, f"/plan/alpha/{name}", "LineStrips3D:strips"
         )
         assert drawn_s == pytest.approx(fake.PLAN_ALPHA_S)
         paths_m = plan.predicted_reports[k].transpose(1, 0, 2)[..., ::-1]
         assert np.array(strips)[..., :2] == pytest.approx(paths_m, abs=1e-6)
         assert (cleared_s, nothing) == (29.0, [])
+
+
+def test_plan_beta_is_drawn_per_vehicle_before_it_is_driven(recording: Path) -> None:
+    predicted_m = fake.plan_beta().predicted_m
+    assert predicted_m is not None
+    [(drawn_s, strips)] = temporal(recording, "/plan/beta", "LineStrips3D:strips")
+    assert drawn_s == pytest.approx(fake.PLAN_BETA_S)
+    assert drawn_s < next(start_s for start_s, phase in fake.PHASES if phase == "mission")
+    paths_m = predicted_m.transpose(1, 0, 2)[..., ::-1]
+    assert np.array(strips)[..., :2] == pytest.approx(paths_m, abs=1e-6)
+
+
+def test_a_curve_grows_on_all_timelines_and_no_point_comes_twice(recording: Path) -> None:
+    for timeline in ("sim_time", "wall_time", "training_steps"):
+        grown = temporal(recording, "/learning/beta/2/attempt_0", "Scalars:scalars", timeline)
+        assert len({t for t, _ in grown}) == len(grown) == len(fake.curve(97.0))
+
+
+def test_a_curve_that_was_not_told_while_it_grew_is_there_at_the_end(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.rrd", "demo", fake.view())
+    recorder.plan(fake.plan_beta())
+    recorder.close()
+    path, steps = "/learning/beta/2/attempt_0", "training_steps"
+    whole = temporal(tmp_path / "a.rrd", path, "Scalars:scalars", steps)
+    assert [(t, v) for t, [v] in whole] == list(fake.curve(97.0))
+
+
+def test_a_geofence_is_drawn_in_dashes_on_plane_and_map(tmp_path: Path) -> None:
+    fence = Geofence(north_min_m=-2.0, north_max_m=4.0, east_min_m=-4.0, east_max_m=4.5)
+    view = fake.view().model_copy(update={"geofence": fence})
+    Recorder(tmp_path / "a.rrd", "demo", view).close()
+    [(_, dashes)] = rows(tmp_path / "a.rrd", "/plane/geofence", "LineStrips3D:strips")
+    corners = np.array(dashes).reshape(-1, 3)
+    assert corners[:, 0].min() == -4.0  # east
+    assert corners[:, 0].max() == 4.5
+    assert corners[:, 1].min() == -2.0  # north
+    assert corners[:, 1].max() == 4.0
+    assert len(dashes) > 20
+    [(_, on_map)] = rows(tmp_path / "a.rrd", "/map/geofence", "GeoLineStrings:line_strings")
+    there_m = [wgs84_to_ned(lat, lon, view.origin.origin()) for lat, lon in on_map[0]]
+    assert np.array(there_m) == pytest.approx(np.array(dashes[0])[:, 1::-1], abs=0.01)
+
+
+def test_without_a_geofence_none_is_drawn(recording: Path) -> None:
+    assert not {"/plane/geofence", "/map/geofence"} & entities(recording)
+
+
+def test_a_minute_of_ten_vehicles_takes_two_megabytes_at_most(tmp_path: Path) -> None:
+    scenario, view = crowd.fleet(10)
+    station = Recorder(tmp_path / "station.rrd", "demo", view)
+    truth = TruthRecorder(tmp_path / "truth.rrd", "demo", scenario)
+    for snapshot in crowd.snapshots(view, seconds=60.0):
+        station.snapshot(snapshot)
+        truth.truth(snapshot.time_s, {v.sysid: (*v.reported_m, 0.0) for v in snapshot.vehicles})
+    station.close()
+    truth.close()
+    merge([tmp_path / "station.rrd", tmp_path / "truth.rrd"], tmp_path / "mission.rrd")
+    assert (tmp_path / "mission.rrd").stat().st_size <= 2_000_000

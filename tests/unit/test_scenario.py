@@ -32,6 +32,12 @@ BAD_FILES: dict[str, tuple[bytes | None, str]] = {
 }
 
 Edit = Callable[[dict[str, Any]], object]
+
+
+def fence(north_max_m: float) -> dict[str, float]:
+    return {"north_min_m": -1, "north_max_m": north_max_m, "east_min_m": -4, "east_max_m": 4.5}
+
+
 BAD_VALUES: dict[str, tuple[Edit, str]] = {
     "unknown key": (lambda t: t.update(colour="red"), "colour"),
     "sysid twice": (lambda t: t["fleet"][1].update(sysid=1), "used more than once"),
@@ -57,6 +63,9 @@ BAD_VALUES: dict[str, tuple[Edit, str]] = {
         "3 vehicles need ports up to 65020; the limit is 65000",
     ),
     "empty arena": (lambda t: t["arena"].update(north_max_m=-9.0), "arena is empty"),
+    "fence beyond the walls": (lambda t: t.update(geofence=fence(9.0)), "outside the arena"),
+    "goal outside the fence": (lambda t: t.update(geofence=fence(0.5)), "outside the geofence"),
+    "fence without an inside": (lambda t: t.update(geofence=fence(-9.0)), "geofence is empty"),
     "fault of a stranger": (lambda t: t["faults"][0].update(vehicle=9), "not in the fleet"),
     "fault of motor 5": (lambda t: t["faults"][0].update(instances=[5]), "the highest is 4"),
     "fault nobody can make": (lambda t: t["faults"][0].update(type="bias"), "no injector"),
