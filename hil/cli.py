@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hil.errors import HilError
-from hil.options import Parser, port, speed
+from hil.options import Parser, count, minutes, port, speed, times
 from hil.scenario import Scenario, load_scenario
 
 EXIT_BROKEN_PIPE = 128 + 13  # as a process that SIGPIPE ended
@@ -89,6 +89,22 @@ def _report(options: argparse.Namespace) -> int:
     from hil.bench.report.write import write_report
 
     print(write_report(options.run, options.out))
+    return 0
+
+
+def _reproduce(options: argparse.Namespace) -> int:
+    import logging
+
+    from base_station.planning.laboratory.jobs import STUDIES
+    from base_station.planning.laboratory.reproduce import reproduce
+    from hil.bench.folders import blind_view
+
+    logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="%(message)s")
+    studies = tuple(study for study in STUDIES if study in (options.studies or STUDIES))
+    base = blind_view(load_scenario(options.scenario))
+    print(
+        reproduce(base, options.out, studies, options.trainings, options.restarts, options.minutes)
+    )
     return 0
 
 
@@ -194,6 +210,29 @@ def _parser() -> argparse.ArgumentParser:
     )
     replay.add_argument("--view", type=Path, metavar="FILE", help="as `hil station-view` prints it")
     replay.set_defaults(command=_replay)
+
+    reproduce = commands.add_parser(
+        "reproduce",
+        help="the paper's results and more, as tables and figures; goes on where it was",
+    )
+    reproduce.add_argument(
+        "scenario", type=Path, nargs="?", default=Path("scenarios/rescue.yaml"), metavar="SCENARIO"
+    )
+    reproduce.add_argument("--trainings", type=count, default=50, metavar="N", help="of each")
+    reproduce.add_argument(
+        "--studies",
+        nargs="+",
+        choices=["paper", "objective", "ladder", "ablation", "cost"],
+        help="default: all of them",
+    )
+    reproduce.add_argument(
+        "--restarts", type=times, default=20, metavar="N", help="when a target is missed"
+    )
+    reproduce.add_argument(
+        "--minutes", type=minutes, metavar="M", help="stop after so long; the same command goes on"
+    )
+    reproduce.add_argument("--out", type=Path, default=Path("reproduction"), metavar="DIR")
+    reproduce.set_defaults(command=_reproduce)
 
     check = commands.add_parser("check", parents=[scenario], help="validate a scenario")
     check.set_defaults(command=_check)

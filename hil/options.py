@@ -30,3 +30,27 @@ def speed(text: str) -> float:
         limits = f"0, or {MIN_SPEED:g} to {MAX_SPEED:g}"
         raise argparse.ArgumentTypeError(f"{text}: must be {limits}")
     return value
+
+
+def count(text: str) -> int:
+    """At least one of something."""
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text}: must be 1 or more")
+    return value
+
+
+def times(text: str) -> int:
+    """How often something may be repeated."""
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text}: must be 0 or more")
+    return value
+
+
+def minutes(text: str) -> float:
+    """A stretch of wall time."""
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text}: must be more than 0")
+    return value

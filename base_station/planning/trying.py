@@ -23,8 +23,14 @@ from base_station.planning.searches.search import Search, search
 from base_station.planning.searches.shooting import shooting
 from base_station.planning.searches.stepwise import stepwise
 from base_station.planning.tasks.alpha import AlphaProblem, AlphaTask
-from base_station.planning.tasks.beta import BetaTask, success_share
-from base_station.planning.tasks.candidates import NOTHING, best_candidate, better, open_loop_plan
+from base_station.planning.tasks.beta import BetaProblem, BetaTask, success_share
+from base_station.planning.tasks.candidates import (
+    NOTHING,
+    Candidate,
+    best_candidate,
+    better,
+    open_loop_plan,
+)
 from hil.scenario import StationView
 
 Learn = Callable[[Lesson, StationView, AlphaProblem], Learned]
@@ -63,7 +69,22 @@ def learn_alpha(
     learn: Learn, view: StationView, request: PlanRequest, seed: int, progress: Progress
 ) -> Attempt:
     """An experiment that tells the request's hypotheses apart, by a learner."""
-    problem, preset, best = alpha_problem(view, request), preset_of(request), NOTHING
+    problem, preset = alpha_problem(view, request), preset_of(request)
+    done, best = taught(learn, view, problem, preset, seed, partial(_forward, progress, preset))
+    took = done.accepted, done.timesteps, done.wall_s, done.curve
+    return Attempt(*took, plan=open_loop_plan(problem, best))
+
+
+def taught(
+    learn: Learn,
+    view: StationView,
+    problem: AlphaProblem,
+    preset: Preset,
+    seed: int,
+    on_progress: Callable[[int, float], None],
+) -> tuple[Learned, Candidate]:
+    """A learner's training for an experiment, and the best plan that any look at it has found."""
+    best = NOTHING
 
     def target(actor: Actor) -> bool:
         nonlocal best
@@ -71,15 +92,20 @@ def learn_alpha(
         return best.error <= view.diagnosis.plan_error
 
     task = AlphaTask(problem, preset.environments, np.random.default_rng(seed))
-    forward = partial(_forward, progress, preset)
-    done = learn(Lesson(task, preset, seed, target, forward), view, problem)
-    took = done.accepted, done.timesteps, done.wall_s, done.curve
-    return Attempt(*took, plan=open_loop_plan(problem, best))
+    done = learn(Lesson(task, preset, seed, target, on_progress), view, problem)
+    return done, best
 
 
 def learn_beta(view: StationView, request: PlanRequest, seed: int, progress: Progress) -> Attempt:
     """A policy for what is left of the mission under the verdict."""
     problem, preset = beta_problem(view, request), preset_of(request)
+    return taught_mission(problem, preset, seed, partial(_forward, progress, preset))
+
+
+def taught_mission(
+    problem: BetaProblem, preset: Preset, seed: int, on_progress: Callable[[int, float], None]
+) -> Attempt:
+    """A training for the mission."""
 
     def target(actor: Actor) -> bool:
         assert isinstance(actor, Gaussian)
@@ -87,7 +113,7 @@ def learn_beta(view: StationView, request: PlanRequest, seed: int, progress: Pro
         return success_share(problem, actor.weights, rng, SUCCESS_ROLLOUTS) >= SUCCESS_SHARE
 
     task = BetaTask(problem, preset.environments, np.random.default_rng(seed))
-    done = train(Lesson(task, preset, seed, target, partial(_forward, progress, preset)))
+    done = train(Lesson(task, preset, seed, target, on_progress))
     assert isinstance(done.actor, Gaussian)
     took = done.accepted, done.timesteps, done.wall_s, done.curve
     weights = done.actor.weights

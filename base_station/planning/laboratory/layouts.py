@@ -56,7 +56,7 @@ def layout(base: StationView, tier: Tier, which: Set, number: int) -> Layout:
         starts = _starts(base, tier, count, dead, rng)
         goals = _places(base, count, PUSHER_M, rng)
         if starts is not None and goals is not None:
-            return Layout(tier, _peopled(base, goals), starts, 0, FAULTS[dead])
+            return Layout(tier, peopled(base, goals), starts, 0, FAULTS[dead])
     raise ValueError(f"the arena has no room for a layout of tier {tier!r}; make it larger")
 
 
@@ -142,7 +142,7 @@ def _inner(base: StationView, margin_m: float) -> tuple[Array, Array]:
     return low, np.array([arena.north_max_m, arena.east_max_m]) - edge
 
 
-def _peopled(base: StationView, goals: Array) -> StationView:
+def peopled(base: StationView, goals: Array) -> StationView:
     """The view with as many copies of its first vehicle as there are goals [V, 2]."""
     first = base.fleet[0]
     fleet = tuple(

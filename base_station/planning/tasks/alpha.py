@@ -13,6 +13,7 @@ from base_station.planning.tasks.objectives import Moment, Objective, Terms
 from base_station.planning.tasks.starts import scattered
 from base_station.planning.tasks.task import Step
 from base_station.twin import (
+    DECLARED,
     EAST,
     HELD_EAST,
     HELD_NORTH,
@@ -23,6 +24,7 @@ from base_station.twin import (
     FaultArrays,
     FleetModel,
     Parameters,
+    Uncertainty,
     perturbed,
     report,
 )
@@ -31,7 +33,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 START_SIGMA_M = 0.03
-NEAR_START_SHARE = 0.5  # of the episodes at first start near the suspect; fades to none half-way
+NEAR_START_SHARE = 0.5
 SCALE_M = 2.0
 
 
@@ -53,6 +55,9 @@ class AlphaProblem:
     objective: Objective
     limits: Limits
     weights: tuple[float, ...]
+    declared: Uncertainty = DECLARED
+    start_sigma_m: float = START_SIGMA_M
+    near_starts: float = NEAR_START_SHARE  # of the episodes at first; fades to none half-way
 
     def move(self, parameters: Parameters, states: Array, memory: Array, setpoints: Array) -> Terms:
         """One control period of states [E, H, V, S] and memory [E, M] in place: named rewards.
@@ -140,7 +145,7 @@ class AlphaTask:
         self.environments, self.progress = environments, 0.0
         self.action_size = problem.commands.size
         self._problem, self._rng = problem, rng
-        self._parameters = perturbed(problem.model, rng, environments)
+        self._parameters = perturbed(problem.model, rng, environments, problem.declared)
         self._states = np.zeros((environments, *problem.start.shape))
         self._memory = problem.objective.begin(problem.reports(self._states))
         self._elapsed = np.zeros(environments, dtype=np.int64)
@@ -169,10 +174,10 @@ class AlphaTask:
         """New episodes; some of them with the commanded vehicles anywhere around the suspect."""
         problem, n = self._problem, int(which.sum())
         states = np.repeat(problem.start[None], n, axis=0)
-        noise = START_SIGMA_M * self._rng.standard_normal((n, 1, problem.model.size, 2))
+        noise = problem.start_sigma_m * self._rng.standard_normal((n, 1, problem.model.size, 2))
         states[..., NORTH : EAST + 1] += noise
         states[..., HELD_NORTH : HELD_EAST + 1] += noise
-        near = self._rng.random(n) < NEAR_START_SHARE * max(0.0, 1.0 - 2.0 * self.progress)
+        near = self._rng.random(n) < problem.near_starts * max(0.0, 1.0 - 2.0 * self.progress)
         others = [v for v in problem.commands.commanded if v != problem.suspect]
         centre = states[near, 0, problem.suspect, NORTH : EAST + 1]
         places = scattered(problem.model, self._rng, centre, others, problem.suspect)
