@@ -1,18 +1,20 @@
 """The estimator: GPS, gyro and compass to position, velocity and heading.
 
 One constant-velocity Kalman filter per NED axis, with acceleration as process noise. All axes see
-the same noise at the same times, so they share one covariance. The accelerometer is not used;
-without fixes the last velocity is believed.
+the same noise at the same times, so they share one covariance. The accelerometer is not used but for
+the height of what flies; without fixes the last velocity is believed.
 """
 
 import math
 from dataclasses import dataclass
 
+from hil.airframe import GRAVITY_MPS2
 from hil.frames import wrap_pi
 from hil.scenario import Sensors as Noise
 from sim_vehicles.sensors import GpsFix, Inertial, Vector
 
 ACCELERATION_SIGMA_MPS2 = 1.5
+BARO_GAINS = 0.1, 0.005  # alpha and beta: settles within a second at 50 Hz
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +68,16 @@ class Estimator:
         self._yaw = wrap_pi(predicted + gain * wrap_pi(sample.compass_rad - predicted))
         self._yaw_variance = (1.0 - gain) * variance
         self._predict(dt_s)
+
+    def barometer(self, down_m: float, sample: Inertial, dt_s: float) -> None:
+        """Height and climb from accelerometer and barometer; for what flies, while it has no fix."""
+        roll, pitch = sample.level_rad
+        upright = math.cos(roll) * math.cos(pitch)
+        gained_mps = (GRAVITY_MPS2 + sample.accel_mps2[2] * upright) * dt_s
+        down, speed = self._axes[2][0], self._axes[2][1] + gained_mps
+        innovation = down_m - down
+        alpha, beta = BARO_GAINS
+        self._axes[2] = (down + alpha * innovation, speed + beta * innovation / dt_s)
 
     def gps(self, fix: GpsFix) -> None:
         """Correct position and velocity; the first fix is taken as it is."""

@@ -174,6 +174,8 @@ class Helm:
             return self._by_hand(estimate, dt_s)
         self._end_climb(estimate)
         velocity = self._aim(estimate, dt_s)
+        if self._navigator.flies and self._senses.is_blind:  # level, as Copter lands without GPS
+            velocity = (*estimate.velocity_mps[:2], velocity[2])
         outputs, self._memory = steer(self._drive, self._memory, estimate, velocity, dt_s)
         if self._lands and has_landed(self._memory):
             self._memory = settle(self._memory)

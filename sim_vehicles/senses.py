@@ -5,16 +5,19 @@ from hil.physics_link import PhysicsState
 from hil.scenario import Sensors
 from sim_vehicles.estimator import Estimate, Estimator
 from sim_vehicles.innovation import Innovation, innovation
-from sim_vehicles.sensors import Gps, GpsFix, Inertial, InertialSensors, Vector
+from sim_vehicles.sensors import Barometer, Gps, GpsFix, Inertial, InertialSensors, Vector
 
+BLIND_AFTER_S = 0.5  # without a fix for so long, what flies no longer believes its speed
 FIX_LOST_AFTER_S = 1.0  # without a fix for so long, telemetry says that there is none
 
 
 class Senses:
     """Sensors and estimator. `home_m` is where the estimate first stood; None until then."""
 
-    def __init__(self, sensors: Sensors, seed: int, sysid: int) -> None:
-        self._noise = sensors
+    def __init__(
+        self, sensors: Sensors, seed: int, sysid: int, barometer: Barometer | None = None
+    ) -> None:
+        self._noise, self._barometer = sensors, barometer
         self._inertial = InertialSensors(sensors, seed, sysid)
         self._gps = Gps(sensors, seed, sysid)
         self._estimator = Estimator(sensors)
@@ -27,6 +30,8 @@ class Senses:
         """Take a state of the physics in. Whether this made the estimate ready."""
         self.sample = self._inertial.sample(state, damage.gyro, damage.accel)
         self._estimator.inertial(self.sample, dt_s)
+        if self._barometer is not None:
+            self._climb(self._barometer.sample(state), self.sample, dt_s)
         fix = self._gps.sample(state, damage.gps)
         if fix is not None:
             self.fix = fix
@@ -38,6 +43,15 @@ class Senses:
             return False
         self.home_m = self._estimator.estimate().position_m
         return True
+
+    def _climb(self, down_m: float, sample: Inertial, dt_s: float) -> None:
+        if self.is_blind and dt_s > 0.0:
+            self._estimator.barometer(down_m, sample, dt_s)
+
+    @property
+    def is_blind(self) -> bool:
+        """No fix for so long that the speed is not known."""
+        return self.home_m is not None and self._estimator.fix_age_s > BLIND_AFTER_S
 
     def estimate(self) -> Estimate:
         return self._estimator.estimate()

@@ -19,7 +19,9 @@ from hil.scenario import Sensors as Noise
 Vector = tuple[float, float, float]
 _GYRO_STREAM, _GPS_STREAM = 0x4759524F, 0x475053
 _ACCEL_STREAM, _IMU_EXTRA_STREAM, _GPS_EXTRA_STREAM = 0x4143434C, 0x494D5558, 0x47505358
+_BARO_STREAM = 0x4241524F
 _BLOCK = 256
+BARO_SIGMA_M = 0.1  # chosen; of one sample, 50 a second
 _WHOLE = GpsDamage()
 _SOUND = ImuDamage()
 
@@ -136,3 +138,14 @@ class Gps:
             position = (n + extra_m * extra[0], e + extra_m * extra[1], d + extra_m * extra[2])
         velocity = (vn + sigma_mps * z[3], ve + sigma_mps * z[4], vd + sigma_mps * z[5])
         return GpsFix(time_s, position, velocity)
+
+
+class Barometer:
+    """White noise on the height."""
+
+    def __init__(self, seed: int, sysid: int) -> None:
+        self._rows = noise_rows((seed, sysid, _BARO_STREAM), 1)
+
+    def sample(self, state: PhysicsState) -> float:
+        """NED down (m)."""
+        return state.position_m[2] + BARO_SIGMA_M * next(self._rows)[0]

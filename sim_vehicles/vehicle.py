@@ -26,6 +26,7 @@ from sim_vehicles.parameters import Parameters, rover_parameters
 from sim_vehicles.port import Port
 from sim_vehicles.ports import PortName, Ports
 from sim_vehicles.senses import Senses
+from sim_vehicles.sensors import Barometer
 from sim_vehicles.services import ftp, time
 from sim_vehicles.services.commands import CommandService, Executor
 from sim_vehicles.services.failure import FailureService, injection_parameters
@@ -58,7 +59,8 @@ class Vehicle:
         member = scenario.vehicle(sysid)
         self._sysid, self._origin = sysid, scenario.origin.origin()
         self._drive = Drive.of(member.frame, scenario.yaw == "locked")
-        self._senses = Senses(scenario.sensors, scenario.seed, sysid)
+        barometer = Barometer(scenario.seed, sysid) if member.frame.flight else None
+        self._senses = Senses(scenario.sensors, scenario.seed, sysid, barometer)
         self._parameters = rover_parameters(sysid, scenario.links.station_sysid, member.frame)
         self._navigator = Navigator(self._origin, member.frame.flight is not None)
         self._guard = Guard(self._parameters, self._navigator, self._senses)

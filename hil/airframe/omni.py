@@ -11,11 +11,12 @@ Pair = tuple[float, float]
 def _omni(
     name: str, frame_type: int, places: Sequence[Pair], directions: Sequence[Pair]
 ) -> Airframe:
-    """Four omni wheels at 0.2 m. An 8 kg research rover.
+    """Four omni wheels at 0.2 m. An 8 kg research rover; its figures are chosen, not a product's.
 
     16 N of stall force a wheel and 1.6 m/s free speed give a time constant of 0.4 s and 3 m/s2
-    at standstill; c_rr = 0.1 is a small rubber wheel on grass (Bekker-type tables give 0.05-0.15).
-    A blocked wheel skids at 0.7 of its quarter of the weight (rubber on dry ground: 0.6-0.8).
+    at standstill. c_rr = 0.1 is between medium hard soil (0.08) and sand (0.1-0.2; Carvill,
+    Mechanical Engineer's Data Handbook). A blocked wheel skids at 0.7 of its quarter of the weight
+    (rubber slides on dry concrete at 0.6-0.85; engineeringtoolbox.com, friction).
     """
     motors = tuple(
         Motor(p, d, 16.0, 1.6, grip_n=13.7) for p, d in zip(places, directions, strict=True)

@@ -4,10 +4,13 @@ import math
 
 from hil.airframe.model import UP, Airframe, Battery, Flight, Motor
 
-# A Holybro X500 kit: 500 mm between opposite motors, 2.0 kg with its 4S 5 Ah battery, 10 inch
-# propellers with about 11 N of thrust each. Inertia of that kit from public system models
-# (0.02-0.03 kg m2 about x and y, 0.04 about z); torque per thrust 0.016 m is a 10 x 4.5 propeller.
-_HALF_M = 0.25 * math.sqrt(0.5)
+# A Holybro X500. Mass, inertia, places of the motors and torque per thrust are those of PX4's model
+# of it (github.com/PX4/PX4-gazebo-models, models/x500_base and models/x500): 2.0 kg, 0.0217, 0.0217
+# and 0.040 kg m2, 0.174 m from both axes, 0.016 m. Its rotors give at most 8.5 N; 11 N is chosen,
+# so that it hovers at less than half of its thrust, as real ones do. 4S battery (16.8 to 13.2 V, as
+# in ArduPilot's Tools/Frame_params/Holybro-X500v2-bdshot.param); its capacity, the currents, drag,
+# friction on the ground and damping are chosen.
+_HALF_M = 0.25 * math.sqrt(0.5)  # a wheelbase of 500 mm
 _THRUST_N = 11.0
 _PITCH_MPS = 17.0  # 4.5 inch of pitch at 9,000 rpm
 
@@ -32,10 +35,11 @@ QUAD_X = Airframe(
     height_m=0.25,
     battery=Battery(capacity_mah=5_000.0, full_v=16.8, empty_v=13.2, motor_a=15.0),
     flight=Flight(
-        tilt_inertia_kgm2=0.025,
+        tilt_inertia_kgm2=0.0217,
         tilt_damping_nms=0.02,
         drag_torque_m=0.016,
-        thrust_expo=0.55,  # ArduPilot advises 0.55 for 10 inch propellers (MOT_THST_EXPO)
+        # MOT_THST_EXPO; 0.65 for 10 inch propellers: ardupilot.org/copter, "Setting Up for Tuning"
+        thrust_expo=0.65,
         tilt_limit_rad=math.radians(30.0),
         climb_limit_mps=2.5,  # WPNAV_SPEED_UP
         descent_limit_mps=1.5,  # WPNAV_SPEED_DN

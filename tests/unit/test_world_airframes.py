@@ -247,6 +247,21 @@ def test_without_a_motor_it_falls_over_and_comes_down(motor: int) -> None:
     assert math.hypot(w.truth().vehicles[1].north_mps, w.truth().vehicles[1].east_mps) < 0.01
 
 
+@pytest.mark.parametrize("motor", range(4))
+def test_losing_a_motor_costs_its_share_of_lift_and_of_balance(motor: int) -> None:
+    """At hover: g/4 down, and moments that the other three no longer balance; it starts to spin."""
+    w, seconds = world(("quad_x", 0, 0)), 0.02
+    w._vehicles[1].air = w._vehicles[1].air.__class__(down_m=-5.0)
+    run(w, seconds, {1: [0 if i == motor else p for i, p in enumerate(hover_pwm())]})
+    lost, share_n = QUAD_X.motors[motor], QUAD_X.weight_n / 4.0
+    tilting = share_n / FLIGHT.tilt_inertia_kgm2 * seconds
+    spinning = share_n * FLIGHT.drag_torque_m / QUAD_X.yaw_inertia_kgm2 * seconds
+    x, y = lost.position_m
+    expected = (y * tilting, -x * tilting, -lost.spin * spinning)
+    assert w.state(1).gyro_radps == pytest.approx(expected, rel=0.05)
+    assert w.truth().vehicles[1].down_mps == pytest.approx(9.81 / 4.0 * seconds, rel=0.03)
+
+
 def test_it_passes_over_a_rover_and_bumps_into_another_quad() -> None:
     w = world(("quad_x", 0.0, 0.0), ("omni_plus", 0.0, 1.5), ("quad_x", 0.0, 3.0))
     run(w, 0.6, {1: [FULL] * 4, 3: [FULL] * 4})
