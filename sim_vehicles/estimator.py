@@ -1,8 +1,8 @@
 """The estimator: GPS, gyro and compass to position, velocity and heading.
 
 One constant-velocity Kalman filter per NED axis, with acceleration as process noise. All axes see
-the same noise at the same times, so they share one covariance. The accelerometer is not used but for
-the height of what flies; without fixes the last velocity is believed.
+the same noise at the same times, so they share one covariance. Without fixes the last velocity is
+believed; only the climb of what flies then follows accelerometer and barometer.
 """
 
 import math
@@ -70,7 +70,7 @@ class Estimator:
         self._predict(dt_s)
 
     def barometer(self, down_m: float, sample: Inertial, dt_s: float) -> None:
-        """Height and climb from accelerometer and barometer; for what flies, while it has no fix."""
+        """Height and climb without a fix, for what flies: accelerometer, corrected by barometer."""
         roll, pitch = sample.level_rad
         upright = math.cos(roll) * math.cos(pitch)
         gained_mps = (GRAVITY_MPS2 + sample.accel_mps2[2] * upright) * dt_s
