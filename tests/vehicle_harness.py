@@ -1,13 +1,16 @@
 """A vehicle on an ideal body: a point mass with the airframe's motors, and both MAVLink ends."""
 
 import math
+from dataclasses import replace
 from typing import TypeVar
 
 from hil.airframe import motor_forces, pwm_to_output
 from hil.faults import GATE, Injection
 from hil.mavlink import (
     COMPONENT_GCS,
+    Command,
     CommandAck,
+    CopterMode,
     Decoder,
     Encoder,
     Message,
@@ -126,3 +129,30 @@ class Harness:
         self.position_m = [
             p + v * STEP_S for p, v in zip(self.position_m, self.velocity_mps, strict=True)
         ]
+
+
+class Hovering(Harness):
+    """A quadcopter that hangs where it is, whatever its rotors do: on the ground, then at 3 m."""
+
+    HEIGHT_M = 3.0
+
+    def __init__(self, scenario: Scenario, sysid: int = 2) -> None:
+        super().__init__(scenario, sysid)
+        self.down_m = 0.0
+
+    def guided(self) -> None:
+        """Ready, armed, in GUIDED and in the air."""
+        self.run(1.5)
+        self.tell(self.station.set_mode(self.sysid, CopterMode.GUIDED))
+        self.tell(self.station.arm(self.sysid))
+        take_off = (Command.NAV_TAKEOFF, 0, 0, 0, math.nan, 0, 0, self.HEIGHT_M)
+        self.tell(self.station.command_long(self.sysid, *take_off))
+        assert [a.result for a in self.values(CommandAck)] == [Result.ACCEPTED]
+        self.down_m = -self.HEIGHT_M
+        self.run(2.0)  # until the estimate is up there, too: the take-off is over
+
+    def state(self) -> PhysicsState:
+        return replace(super().state(), position_m=(0.0, 0.0, self.down_m))
+
+    def _move(self) -> None:
+        """It stays."""

@@ -317,6 +317,99 @@ def test_contact_keeps_momentum_and_makes_no_energy(name: str) -> None:
     assert touched
 
 
+def test_omni_plus_terminal_turn_rate() -> None:
+    """As omni X: (u - M / (4 F r)) v0 / r."""
+    w = world(("omni_plus", 0, 0))
+    run(w, 5.0, {1: pwm(mix(OMNI_PLUS, 0.0, 0.0, 0.5))})
+    stall_n = sum(m.stall_force_n for m in OMNI_PLUS.motors)
+    arm_m = math.hypot(*OMNI_PLUS.motors[0].position_m)
+    free_mps = OMNI_PLUS.motors[0].free_speed_mps
+    expected = (0.5 - OMNI_PLUS.yaw_resistance_nm / (stall_n * arm_m)) * free_mps / arm_m
+    assert w.state(1).gyro_radps[2] == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", sorted(set(AIRFRAMES) - {"quad_x"}))
+@pytest.mark.parametrize("speed_mps", [0.5, 1.5])
+def test_every_rover_rolls_out(name: str, speed_mps: float) -> None:
+    """v^2 / 2 c g ahead, and rest."""
+    w = world((name, 0, 0))
+    launch(w, speed_mps, 0.0)
+    run(w, 4.0, {})
+    way = speed_mps**2 / (2 * AIRFRAMES[name].rolling_resistance * GRAVITY_MPS2)
+    v = w.truth().vehicles[1]
+    assert v.north_m == pytest.approx(way, abs=1.5 * speed_mps * STEP_S)
+    assert v.north_mps == 0.0
+
+
+def test_a_quad_in_the_air_is_slowed_by_drag_alone() -> None:
+    """1 / v grows by k t / m with k = rho / 2 CdA, while rotors carry the weight."""
+    w = world(("quad_x", -40, 0))
+    w._vehicles[1].air = w._vehicles[1].air.__class__(down_m=-20.0)
+    launch(w, 8.0, 0.0)
+    run(w, 4.0, {1: hover_pwm()})
+    k = 0.5 * AIR_DENSITY_KGPM3 * QUAD_X.drag_area_m2
+    v = w.truth().vehicles[1]
+    assert 1.0 / v.north_mps - 1.0 / 8.0 == pytest.approx(k * 4.0 / QUAD_X.mass_kg, rel=0.01)
+    way = QUAD_X.mass_kg / k * math.log1p(8.0 * k * 4.0 / QUAD_X.mass_kg)
+    assert v.north_m == pytest.approx(way - 40.0, abs=0.05)
+
+
+def test_a_quad_turns_by_the_torque_of_its_rotors() -> None:
+    """Nothing but the rotors turns it in the air: w = N t / I, by their drag torques."""
+    w = world(("quad_x", 0, 0))
+    w._vehicles[1].air = w._vehicles[1].air.__class__(down_m=-20.0)
+    outputs = pwm(mix_rotors(QUAD_X, 0.5, 0.0, 0.0, 0.02))
+    run(w, 0.5, {1: outputs})
+    torque_nm = sum(
+        m.spin * FLIGHT.drag_torque_m * thrust_n(p) / 4.0
+        for m, p in zip(QUAD_X.motors, outputs, strict=True)
+    )
+    expected = torque_nm * 0.5 / QUAD_X.yaw_inertia_kgm2
+    assert w.state(1).gyro_radps[2] == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_quad_tilted_for_good_reaches_the_speed_at_which_drag_is_its_thrust() -> None:
+    """sqrt(T sin a / k), with the height held by hand."""
+    w, tilt = world(("quad_x", 0, -45)), math.radians(5.0)
+    thrust = hover_pwm(1.0 / math.cos(tilt))
+    force_n = sum(thrust_n(p) / 4.0 for p in thrust) * math.sin(tilt)
+    expected = math.sqrt(force_n / (0.5 * AIR_DENSITY_KGPM3 * QUAD_X.drag_area_m2))
+    launch(w, 0.0, 0.95 * expected)
+    for _ in range(round(9.0 / STEP_S)):
+        w._vehicles[1].air = w._vehicles[1].air.__class__(down_m=-5.0, tilt_rad=(tilt, 0.0))
+        w.step({1: thrust})
+    assert w.truth().vehicles[1].east_mps == pytest.approx(expected, rel=0.02)
+
+
+def test_contact_between_unlike_airframes_keeps_momentum_and_makes_no_energy() -> None:
+    """Every pair of rovers, off centre; only the ground's share of a step may be missing."""
+    rovers = sorted(set(AIRFRAMES) - {"quad_x"})
+    for one in rovers:
+        for other in rovers:
+            frames = {1: AIRFRAMES[one], 2: AIRFRAMES[other]}
+            gap_m = 1.1 * (frames[1].radius_m + frames[2].radius_m)
+            w = world((one, 0.1, 0.0), (other, 0.0, gap_m))
+            launch(w, 0.0, 1.5)
+            most_ns = sum(f.resistance_n("y") for f in frames.values()) * STEP_S * 1.01
+            before, touched = energy_j(w, frames), False
+            for _ in range(150):
+                start = momentum_ns(w, frames)
+                w.step({})
+                after = energy_j(w, frames)
+                assert math.dist(momentum_ns(w, frames), start) <= most_ns
+                assert after <= before + 1e-9
+                before, touched = after, touched or bool(w.contacts())
+            assert touched, (one, other)
+
+
+def momentum_ns(w: World, frames: dict[int, Airframe]) -> tuple[float, float]:
+    bodies = w.truth().vehicles.items()
+    return (
+        sum(frames[s].mass_kg * v.north_mps for s, v in bodies),
+        sum(frames[s].mass_kg * v.east_mps for s, v in bodies),
+    )
+
+
 @pytest.mark.parametrize("name", set(AIRFRAMES) - {"omni_plus"})
 def test_the_station_says_that_it_has_no_twin_of_it(name: str) -> None:
     vehicle = {"name": "a", "sysid": 1, "airframe": name}
