@@ -42,8 +42,8 @@ def main() -> None:
     print(f"| {options.vehicles} vehicles at real time | measured |\n|---|---|")
     print(f"| processor, of one core | {100 * share:.1f} % |")
     print(f"| file while it runs | {(running_mb - running_once_mb) / minutes:.2f} MB a minute |")
-    print(f"| file afterwards | {(merged_mb - once_mb) / minutes:.2f} MB a minute |")
-    print(f"| layout and looks, once | {once_mb:.2f} MB |")
+    print(f"| file of {options.seconds:g} s afterwards, all in all | {merged_mb:.2f} MB |")
+    print(f"| of that, layout and looks | {once_mb:.2f} MB |")
     print(f"| lost by a SIGKILL | {lost_s(options.vehicles):.2f} s |")
 
 

@@ -48,7 +48,7 @@ def headless(rrd: Path | None = None) -> Iterator["Viewer"]:
         env={**os.environ, "CI": "1"},  # otherwise it looks for news on the network
     )
     try:
-        viewer = Viewer(_connect(process, port), f"127.0.0.1:{port}")
+        viewer = Viewer(_connect(process, port), f"127.0.0.1:{port}", process.pid)
         if rrd is not None:
             viewer.open(rrd)
         yield viewer
@@ -60,8 +60,8 @@ def headless(rrd: Path | None = None) -> Iterator["Viewer"]:
 class Viewer:
     """Drives one viewer."""
 
-    def __init__(self, client: Any, address: str) -> None:
-        self._client, self.address = client, address
+    def __init__(self, client: Any, address: str, pid: int) -> None:
+        self._client, self.address, self.pid = client, address, pid
         self._started_s = time.monotonic()
 
     def open(self, rrd: Path) -> None:

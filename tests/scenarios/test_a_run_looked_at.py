@@ -2,7 +2,10 @@
 
 import io
 import json
+import math
+import os
 import re
+import signal
 import socket
 import time
 from collections.abc import Iterator
@@ -13,9 +16,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from base_station.execution import SETTLE_S
 from base_station.recording.blueprint import TABS
 from base_station.recording.reading import Recording
 from base_station.recording.screenshot import headless
+from hil.bench.console import Console
+from hil.bench.lines import StationEvent
 from hil.bench.replaying import replay_run
 from hil.bench.report.write import write_report
 from hil.bench.run import RunOptions, run
@@ -132,6 +138,22 @@ def test_phases_change_when_the_events_say_so(folder: Path, rrd: Path) -> None:
     assert found == told[-len(found) :]
 
 
+def test_plan_beta_is_there_before_it_is_driven(folder: Path, rrd: Path) -> None:
+    (planned_s, [*ways]) = temporal(rrd, "/plan/beta", "LineStrips3D:strips")[0]
+    begun_s = [e["time_s"] for e in lines(folder / "events.jsonl") if e["text"] == "mission"]
+    assert planned_s <= begun_s[0]
+    assert len(ways) == 3
+
+
+def test_learning_is_a_curve_on_every_timeline(rrd: Path, recording: Recording) -> None:
+    for path in recording.entities("/learning/"):
+        for timeline in ("sim_time", "wall_time", "training_steps"):
+            grown = temporal(rrd, path, "Scalars:scalars", timeline)
+            times = {time for time, _ in grown}
+            assert len(times) > 3
+            assert timeline != "training_steps" or len(times) == len(grown)
+
+
 def test_quantities_have_their_units(recording: Recording, rescued: Scenario) -> None:
     times_s, places_m = recording.places("/fleet")
     goals_m = np.array([(v.goal.north_m, v.goal.east_m) for v in rescued.fleet])
@@ -236,6 +258,41 @@ def test_a_viewer_that_never_reads_changes_nothing(
         assert run(healthy, RunOptions(out=tmp_path / "run", in_memory=True, viewer=True)) == 0
         assert time.monotonic() - started_s < 60.0
     assert Recording(tmp_path / "run" / "mission.rrd").places("/fleet")[0].size > 300
+
+
+class Killer(Console):
+    """Kills the viewer, the hard way, as soon as a phase begins."""
+
+    def __init__(self, phase: str, pid: int) -> None:
+        super().__init__()
+        self._phase, self._pid = phase, pid
+        self.killed_s = math.nan
+
+    def event(self, event: StationEvent) -> None:
+        super().event(event)
+        if event.kind == "phase" and event.text == self._phase:
+            os.kill(self._pid, signal.SIGKILL)
+            self.killed_s = event.time_s
+
+
+@needs_vulkan
+def test_a_viewer_killed_in_the_midst_of_a_run_changes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    healthy = load_scenario(SCENARIOS / "healthy.yaml")
+    with headless() as viewer:
+        monkeypatch.setattr("hil.bench.run.live_viewer", lambda *_: Viewer(viewer.address))
+        console = Killer("probe", viewer.pid)
+        run(healthy, RunOptions(out=tmp_path / "run", viewer=True), console)
+    times_s, _ = Recording(tmp_path / "run" / "mission.rrd").places("/fleet")
+    assert times_s[-1] > console.killed_s + 20.0
+    assert np.diff(times_s) == pytest.approx(0.1)  # no tick is late or missing
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert result["ended"] == "completed"
+    assert {goal["declared"] for goal in result["goals"].values()} == {"reached"}
+    probed_s = next(p["sim_s"] for p in result["phases"] if p["phase"] == "probe")
+    pulses_s = 4 * len(healthy.fleet) * (healthy.limits.probe_pulse_s + SETTLE_S)
+    assert probed_s == pytest.approx(pulses_s, abs=0.3)
 
 
 def _colors(png: bytes) -> int:
