@@ -102,7 +102,7 @@ def lost_s(vehicles: int) -> float:
         killed_s = time.time()
         os.kill(process.pid or 0, signal.SIGKILL)
         process.join()
-        return killed_s - float(Recording(file).scalars("/speed", "wall_time").times[-1])
+        return killed_s - float(Recording(file).scalars("/residual/north", "wall_time").times[-1])
 
 
 def fleet(vehicles: int) -> tuple[Scenario, StationView]:
