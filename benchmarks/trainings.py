@@ -6,7 +6,8 @@
 One seed after the other on one thread; times are CPU seconds of this process. near and far: three
 rovers in a row 2.5 or 4.3 m apart, the suspect held, `motor_y_off` or `gps_east_stuck`. beta: the
 mission of `rescue` from its start, y motors off. Success is what the planner promises: a predicted
-error of at most 1 % in 90 % of draws; all goals in 95 % of perturbed rollouts.
+error of at most 1 % in 90 % of draws; all goals in 95 % of perturbed rollouts. `hil reproduce` has
+more.
 """
 
 import argparse
@@ -17,17 +18,14 @@ from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
-import numpy as np
-
-from base_station.hypotheses import candidates
+from base_station.planning.laboratory.jobs import Job
+from base_station.planning.laboratory.measure import APART_M, row_of_three
+from base_station.planning.laboratory.tables import wilson
 from base_station.planning.planner import plan
 from base_station.planning.requests import PlanRequest
-from base_station.twin import initial_state
 from hil.scenario import StationView, load_scenario, station_view
 
 RESCUE = Path(__file__).parents[1] / "scenarios" / "rescue.yaml"
-APART_M = {"near": 2.5, "far": 4.3, "beta": 2.5}
-Z = 1.96  # 95 %
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,8 @@ def rows(options: argparse.Namespace) -> Iterator[Row]:
         planning = view.planning.model_copy(update=changes)
         asked = view.model_copy(update={"planning": planning})
         seeds = range(options.first, options.first + options.trainings)
-        tries = [once(asked, request(view, case, preset, seed)) for seed in seeds]
+        jobs = [Job("paper", case, planner, preset, seed) for seed in seeds]
+        tries = [once(asked, row_of_three(view, job)) for job in jobs]
         accepted, cpu_s, timesteps = zip(*tries, strict=True)
         name = f"{case}, {planner}, {objective if case != 'beta' else '-'}, {preset}"
         yield Row(name, accepted, cpu_s, timesteps)
@@ -75,31 +74,6 @@ def once(view: StationView, asked: PlanRequest) -> tuple[bool, float, int]:
     started_s = time.process_time()
     (training,) = plan(view, asked, lambda _: None).trainings
     return training.accepted, time.process_time() - started_s, training.timesteps
-
-
-def request(view: StationView, case: str, preset: str, seed: int) -> PlanRequest:
-    known = {h.name: h for h in candidates(view.fleet[1], view.diagnosis.priors)}
-    names = ("motor_y_off",) if case == "beta" else ("motor_y_off", "gps_east_stuck")
-    apart = APART_M[case]
-    start = initial_state([[0.0, -apart], [0.0, 0.0], [0.0, apart]], [0.0] * 3)
-    return PlanRequest(
-        number=1,
-        kind="beta" if case == "beta" else "alpha",
-        seed=seed,
-        preset=preset,
-        hypotheses=tuple(known[n] for n in names),
-        posterior=(1.0 / len(names),) * len(names),
-        states=np.stack([start] * len(names)),
-        delivered=(False,) * 3,
-    )
-
-
-def wilson(successes: int, count: int) -> tuple[float, float]:
-    """The 95 % score interval of a share."""
-    share, z2 = successes / count, Z * Z / count
-    middle = (share + z2 / 2) / (1 + z2)
-    half = Z * ((share * (1 - share) / count + z2 / count / 4) ** 0.5) / (1 + z2)
-    return middle - half, middle + half
 
 
 def _options() -> argparse.Namespace:
