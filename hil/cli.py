@@ -66,6 +66,14 @@ def _run(options: argparse.Namespace) -> int:
     )
 
 
+def _campaign(options: argparse.Namespace) -> int:
+    from hil.bench.campaign.command import CampaignOptions, run_campaign
+
+    return run_campaign(
+        options.campaign, CampaignOptions(options.out, options.jobs, options.backend)
+    )
+
+
 def _view(options: argparse.Namespace) -> int:
     from hil.bench.viewers import view
 
@@ -183,6 +191,17 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.add_argument("--serve", action="store_true", help="offer a web viewer on this machine")
     run.set_defaults(command=_run)
+
+    campaign = commands.add_parser("campaign", help="many runs in memory: a table and a report")
+    campaign.add_argument("campaign", type=Path, metavar="CAMPAIGN", help="a YAML file")
+    campaign.add_argument("--jobs", type=count, metavar="N", help="at a time; default all cores")
+    campaign.add_argument(
+        "--backend", choices=("local", "ray"), default="local", help="where: here, or a Ray cluster"
+    )
+    campaign.add_argument(
+        "--out", type=Path, metavar="DIR", help="default runs/campaign-NAME; goes on where it ended"
+    )
+    campaign.set_defaults(command=_campaign)
 
     recorded = Parser(add_help=False)
     recorded.add_argument("run", type=Path, metavar="RUN", help="a run's folder, or an .rrd file")

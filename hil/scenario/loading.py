@@ -22,21 +22,22 @@ M = TypeVar("M", bound=Model)
 
 def load_scenario(path: Path, overrides: Sequence[str] = ()) -> Scenario:
     """Read a scenario; `overrides` are `key.path=value` as given to `--set`. Raises InputError."""
-    tree = _read_map(path)
+    tree = read_map(path)
     for override in overrides:
-        _apply_override(tree, override)
-    return _validated(Scenario, path, tree)
+        apply_override(tree, override)
+    return validated(Scenario, path, tree)
 
 
 def load_station_view(path: Path) -> StationView:
     """Read a station view, or a fleet file as one. Raises InputError."""
-    tree = _read_map(path)
+    tree = read_map(path)
     if is_fleet_file(tree):
-        return _validated(FleetFile, path, tree).view()
-    return _validated(StationView, path, tree)
+        return validated(FleetFile, path, tree).view()
+    return validated(StationView, path, tree)
 
 
-def _validated(model: type[M], path: Path, tree: dict[str, Any]) -> M:
+def validated(model: type[M], path: Path, tree: dict[str, Any]) -> M:
+    """A tree that came from `path` as a model. Raises InputError."""
     try:
         return model.model_validate(tree)
     except ValidationError as error:
@@ -79,7 +80,8 @@ class _StrictLoader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
-def _read_map(path: Path) -> dict[str, Any]:
+def read_map(path: Path) -> dict[str, Any]:
+    """The keys and values of a YAML file. Raises InputError."""
     try:
         raw = path.read_bytes()
     except OSError as error:
@@ -100,7 +102,8 @@ def _read_map(path: Path) -> dict[str, Any]:
     return tree
 
 
-def _apply_override(tree: dict[str, Any], override: str) -> None:
+def apply_override(tree: dict[str, Any], override: str) -> None:
+    """Change one value of a tree, as `--set key.path=value` does. Raises InputError."""
     key_path, equals, text = override.partition("=")
     if not equals or not key_path:
         raise InputError(f"--set {override}: must be key.path=value, as in --set seed=3")
@@ -108,22 +111,27 @@ def _apply_override(tree: dict[str, Any], override: str) -> None:
         value = yaml.load(text, _StrictLoader)  # a SafeLoader
     except (yaml.YAMLError, ValueError, RecursionError):
         raise InputError(f"--set {_short(override)}: the value is not valid YAML") from None
+    put(tree, key_path, value, f"--set {override}")
+
+
+def put(tree: dict[str, Any], key_path: str, value: Any, told: str) -> None:
+    """Change one value of a tree in place. Raises InputError, which begins with `told`."""
     *parents, last = key_path.split(".")
     node: Any = tree
     for key in parents:
-        node = _child(node, key, override)
+        node = _child(node, key, told)
     if isinstance(node, dict):
         node[last] = value
     else:
-        _child(node, last, override)
+        _child(node, last, told)
         node[int(last)] = value
 
 
-def _child(node: Any, key: str, override: str) -> Any:
+def _child(node: Any, key: str, told: str) -> Any:
     if isinstance(node, list):
         if key.isdecimal() and int(key) < len(node):
             return node[int(key)]
-        raise InputError(f"--set {override}: {key} is not an index below {len(node)}")
+        raise InputError(f"{told}: {key} is not an index below {len(node)}")
     if isinstance(node, dict):
         return node.setdefault(key, {})
-    raise InputError(f"--set {override}: {key} is inside a plain value")
+    raise InputError(f"{told}: {key} is inside a plain value")
