@@ -12,6 +12,7 @@ from base_station.recording.palette import (
 )
 from hil.bench.report.record import RunTold
 from hil.bench.report.style import DIM, GROUND, INK, LINES, figure, legend, png, shade, shade_phases
+from hil.scenario import Rectangle as Area
 
 MAX_RADIUS_M = 0.35
 M_PER_SQRT_NS = 0.12
@@ -35,10 +36,9 @@ def figures(run: RunTold) -> dict[str, bytes]:
 def trajectories(run: RunTold) -> bytes:
     """Where everybody truly went and reported to be, from above; contacts circled."""
     made, [axes] = figure(6.6)
-    arena = run.scenario.arena
-    corner = (arena.east_min_m, arena.north_min_m)
-    size = (arena.east_max_m - arena.east_min_m, arena.north_max_m - arena.north_min_m)
-    axes.add_patch(Rectangle(corner, *size, fill=False, edgecolor=DIM, lw=1.0))
+    axes.add_patch(_outline(run.scenario.arena, "-"))
+    if run.scenario.geofence:
+        axes.add_patch(_outline(run.scenario.geofence, "--"))
     for k, vehicle in enumerate(run.scenario.fleet):
         color = shade(vehicle_color(k))
         north, east = run.truth_m[:, k].T
@@ -61,6 +61,12 @@ def trajectories(run: RunTold) -> bytes:
     axes.set(xlabel="east (m)", ylabel="north (m)", aspect="equal")
     legend(axes, loc="center left", bbox_to_anchor=(1.02, 0.5))
     return png(made)
+
+
+def _outline(area: Area, style: str) -> Rectangle:
+    corner = (area.east_min_m, area.north_min_m)
+    size = (area.east_max_m - area.east_min_m, area.north_max_m - area.north_min_m)
+    return Rectangle(corner, *size, fill=False, edgecolor=DIM, lw=1.0, ls=style)
 
 
 def _contact(
