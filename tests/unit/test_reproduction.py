@@ -141,6 +141,9 @@ def test_a_training_tells_of_mode_sample_and_d(rescue_view, tmp_path):
     assert attempt["mode"] != attempt["sample"]
     text = report({job.key: row})
     assert "| near, ppo, tuned | 1 of 1 (21-100 %) | 1 of 1 (21-100 %) |" in text
+    assert "94 % (MLP)" in text
+    told = [f"{d:.2f}" for d in attempt["mode"]["by_vehicle_m"]]
+    assert f"| near, ppo, tuned | {' | '.join(told)} |" in text
     assert reproducing.figures.learning_curves({job.key: row}, tmp_path / "curves.svg")
     assert (tmp_path / "curves.svg").stat().st_size > 1000
 
