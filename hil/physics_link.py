@@ -18,6 +18,7 @@ Vector3 = tuple[float, float, float]
 
 _LAYOUTS = {16: (18458, struct.Struct("<HHI16H")), 32: (29569, struct.Struct("<HHI32H"))}
 _CHANNELS_BY_SIZE = {layout.size: channels for channels, (_, layout) in _LAYOUTS.items()}
+_COMPACT = json.JSONEncoder(separators=(",", ":"))
 AT_REST_MPS2: Vector3 = (0.0, 0.0, -GRAVITY_MPS2)
 
 
@@ -79,7 +80,7 @@ def encode_state(state: PhysicsState) -> bytes:
         "velocity": state.velocity_mps,
         "attitude": state.attitude_rad,
     }
-    return b"\n" + json.dumps(tree, separators=(",", ":")).encode() + b"\n"
+    return b"\n" + _COMPACT.encode(tree).encode() + b"\n"
 
 
 def decode_state(datagram: bytes) -> PhysicsState | None:
@@ -100,9 +101,12 @@ def decode_state(datagram: bytes) -> PhysicsState | None:
 
 
 def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if type(value) is float:
+        number = value
+    elif type(value) is int:  # not a bool, and JSON has no others
+        number = float(value)
+    else:
         raise TypeError("not a number")
-    number = float(value)
     if not math.isfinite(number):
         raise ValueError("not finite")
     return number

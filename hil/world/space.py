@@ -6,6 +6,7 @@ has height and tilt beside the plane (`flight`), and meets the others only at th
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import pymunk
@@ -53,29 +54,29 @@ class _Vehicle:
 
     @property
     def velocity_mps(self) -> Vector3:
-        return self.body.velocity.x, self.body.velocity.y, self.air.down_mps
+        north, east = self.body.velocity  # asked once: each time, pymunk asks its library
+        return north, east, self.air.down_mps
 
     def drive(self, pwm_us: Sequence[int], terrain: Ambient, dt_s: float) -> None:
         """Forces for the next step: motors, slope, wind, and what the ground may hold."""
-        outputs = [pwm_to_output(pwm) for pwm in pwm_us[: len(self.frame.motors)]]
-        outputs += [None] * (len(self.frame.motors) - len(outputs))
+        outputs, locked = _powered(tuple(pwm_us), len(self.frame.motors))
         friction = friction_factor(terrain, *self.body.position) if terrain.patches else 1.0
         if self.frame.flight is None:
             self._roll(outputs, terrain)
-            self.ground.hold(friction, locked_motors(pwm_us[: len(outputs)]))
+            self.ground.hold(friction, locked)
         else:
             load_n = self._fly(outputs, terrain, dt_s)
             self.ground.hold(friction * load_n / self.frame.weight_n, ())
 
     def _roll(self, outputs: Sequence[float | None], terrain: Ambient) -> None:
-        yaw, velocity = self.body.angle, self.body.velocity
-        velocity_body = ned_to_body(velocity.x, velocity.y, yaw)
+        yaw, velocity_mps = self.body.angle, self.velocity_mps
+        velocity_body = ned_to_body(velocity_mps[0], velocity_mps[1], yaw)
         fx, fy, torque = motor_forces(
             self.frame, outputs, velocity_body, self.body.angular_velocity
         )
         north, east = body_to_ned(fx, fy, yaw)
         down_n, down_e = slope_force_n(terrain.slope, self.frame.mass_kg)
-        wind_n, wind_e, _ = wind_force_n(self.frame, terrain.wind, self.velocity_mps)
+        wind_n, wind_e, _ = wind_force_n(self.frame, terrain.wind, velocity_mps)
         self.body.force = north + down_n + wind_n, east + down_e + wind_e
         self.body.torque = torque
 
@@ -222,6 +223,16 @@ class World:
         shape.collision_type = collision_type
         self._names[shape] = name
         self._space.add(shape)
+
+
+@lru_cache(maxsize=256)
+def _powered(
+    pwm_us: tuple[int, ...], motors: int
+) -> tuple[tuple[float | None, ...], frozenset[int]]:
+    """Outputs of so many motors, and which wheels are blocked. A frame holds for several steps."""
+    driven = pwm_us[:motors]
+    outputs = tuple(pwm_to_output(pwm) for pwm in driven)
+    return outputs + (None,) * (motors - len(driven)), locked_motors(driven)
 
 
 def _truth(vehicle: _Vehicle) -> VehicleTruth:

@@ -13,6 +13,7 @@ from hil.scenario import Patch, Slope, Terrain, Wind, in_effect
 AIR_DENSITY_KGPM3 = 1.225  # ISA, sea level
 
 Vector = tuple[float, float, float]
+_CALM = Wind()
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ def wind_force_n(frame: Airframe, wind: Wind, velocity_mps: Vector) -> Vector:
     """What wind adds (N, NED) to the drag in still air."""
     if wind.north_mps == 0.0 and wind.east_mps == 0.0:
         return 0.0, 0.0, 0.0
-    windy, still = drag_n(frame, wind, velocity_mps), drag_n(frame, Wind(), velocity_mps)
+    windy, still = drag_n(frame, wind, velocity_mps), drag_n(frame, _CALM, velocity_mps)
     return windy[0] - still[0], windy[1] - still[1], windy[2] - still[2]
 
 
