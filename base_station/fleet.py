@@ -11,6 +11,7 @@ from hil.scenario import StationView
 
 WAIT_FOR_LATE_S = 0.3  # fleet time; then a tick goes on without the vehicle that is late
 LINK_LOST_WALL_S = 5.0
+LONG_GAP_S = 6.0  # after that long without a command nothing moves: no need to tick through it
 
 
 class Fleet:
@@ -73,12 +74,23 @@ class Fleet:
         self._next_tick = int(self.newest_s / self.period_s) + 1
 
     def due(self) -> list[Frame]:
-        """The frames whose time has come: all vehicles in, or the late ones waited for."""
-        frames = []
+        """The frames whose time has come: all vehicles in, or the late ones waited for.
+
+        Of a gap longer than LONG_GAP_S only the beginning and the end.
+        """
+        frames: list[Frame] = []
         while self._is_due(self._next_tick * self.period_s):
             frames.append(frame_at(self.tracks, self._next_tick * self.period_s))
             self._next_tick += 1
+            if len(frames) == round(LONG_GAP_S / self.period_s):
+                newest = int((self.newest_s + 1e-3) / self.period_s)
+                self._next_tick = max(self._next_tick, newest)
         return frames
+
+    def excuse(self, absent_s: float) -> None:
+        """Silence of vehicles does not count while the station itself was not listening."""
+        for track in self.tracks:
+            track.last_heard_wall_s += absent_s
 
     def _is_due(self, time_s: float) -> bool:
         times = [t.newest_s() for t in self.tracks]

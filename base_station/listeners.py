@@ -1,12 +1,14 @@
 """Listeners that write: telemetry logs, events.jsonl, and lines for whoever started the station."""
 
 import json
+import os
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
-from base_station.node import Listener
+from base_station.journal import event_tree
+from base_station.listening import Listener
 from base_station.planning.requests import PlanProgress, PlanReady
 from base_station.recorder import Recorder
 from base_station.records import Event, Snapshot
@@ -33,8 +35,10 @@ class Silent:
 class TelemetryLogs(Silent):
     """One .tlog per vehicle link, both directions."""
 
-    def __init__(self, folder: Path, view: StationView) -> None:
-        self._logs = [TlogWriter(folder / f"{m.name}.tlog") for m in view.fleet]
+    name = "the telemetry log"
+
+    def __init__(self, folder: Path, view: StationView, append: bool = False) -> None:
+        self._logs = [TlogWriter(folder / f"{m.name}.tlog", append) for m in view.fleet]
 
     def datagram(self, index: int, time_us: int, datagram: bytes) -> None:
         self._logs[index].write(time_us, datagram)
@@ -42,11 +46,6 @@ class TelemetryLogs(Silent):
     def close(self) -> None:
         for log in self._logs:
             log.close()
-
-
-def event_line(event: Event) -> dict[str, Any]:
-    """An event as plain JSON values; there is no wall time in it."""
-    return {"time_s": event.time_s, "kind": event.kind, "text": event.text, "data": event.data}
 
 
 class Lines(Silent):
@@ -59,7 +58,7 @@ class Lines(Silent):
         self._write({"type": "tick", "time_s": snapshot.time_s, "phase": snapshot.phase})
 
     def event(self, event: Event) -> None:
-        self._write({"type": "event", **event_line(event)})
+        self._write({"type": "event", **event_tree(event)})
 
     def progress(self, progress: PlanProgress) -> None:
         self._write(
@@ -80,15 +79,25 @@ class Lines(Silent):
 class EventLog(Silent):
     """events.jsonl, a line an event, on disk at once."""
 
-    def __init__(self, path: Path) -> None:
-        self._file = path.open("w", encoding="utf-8")
+    name = "events.jsonl"
+
+    def __init__(self, path: Path, append: bool = False) -> None:
+        """`append` goes on with what there is, without a line that was cut off."""
+        if append and path.exists():
+            os.truncate(path, path.read_bytes().rfind(b"\n") + 1)
+        self._file = path.open("a" if append else "w", encoding="utf-8")
 
     def event(self, event: Event) -> None:
-        self._file.write(json.dumps(event_line(event)) + "\n")
+        self._file.write(json.dumps(event_tree(event)) + "\n")
         self._file.flush()
 
     def close(self) -> None:
         self._file.close()
+
+
+def _close(listener: TelemetryLogs | EventLog | Recorder) -> None:
+    with suppress(OSError):  # a full disk has been heard of already
+        listener.close()
 
 
 def open_listeners(
@@ -98,14 +107,17 @@ def open_listeners(
     view: StationView,
     viewer: str | None,
     say: Callable[[dict[str, Any]], None],
+    resumed: int = 0,
 ) -> list[Listener]:
     """Everything that listens to a station: telemetry logs, events, recording, lines.
 
-    They write into `folder` and are closed by `stack`.
+    They write into `folder` and are closed by `stack`. One that was `resumed` goes on with the
+    files of the one before, but for the recording, which gets a part of its own.
     """
-    logs = TelemetryLogs(folder, view)
-    events = EventLog(folder / "events.jsonl")
-    recorder = Recorder(folder / "station.rrd", run_id, view, viewer=viewer)
+    logs = TelemetryLogs(folder, view, append=resumed > 0)
+    events = EventLog(folder / "events.jsonl", append=resumed > 0)
+    part = f"station-{resumed + 1}.rrd" if resumed else "station.rrd"
+    recorder = Recorder(folder / part, run_id, view, viewer=viewer)
     for listener in (logs, events, recorder):
-        stack.callback(listener.close)
+        stack.callback(_close, listener)
     return [logs, events, recorder, Lines(say)]

@@ -1,22 +1,28 @@
 """The station on its links: bytes to typed values, the step, and bytes again; and its listeners.
 
 The same node runs over UDP (`process.py`) and over memory. All that it tells the outside goes to
-listeners, which only listen.
+listeners, which only listen. What it does depends on the inputs of its steps alone. They go to a
+journal before the step; `replay` takes them from there, tells nobody, and believes the same again.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 from base_station.commands import encode
+from base_station.journal import Datagrams, Inputs
+from base_station.listening import Listener, Listeners
 from base_station.outcome import PhaseTimes, outcome, training
 from base_station.planning.requests import PlanProgress, PlanReady, PlanRequest
-from base_station.records import Event, Snapshot
-from base_station.station import Station
+from base_station.records import Event
+from base_station.refusals import Refusals
+from base_station.station import Outputs, Station
 from hil.link import Link
-from hil.mavlink import COMPONENT_GCS, Decoder, Encoder
+from hil.mavlink import COMPONENT_GCS, Decoder, Encoder, Received, Signing, ticks
 from hil.scenario import StationView
 
 LINGER_S = 1.0  # after the end, until every vehicle has confirmed HOLD
+
+Heard = list[tuple[int, Received]]
 
 
 class Planner(Protocol):
@@ -27,24 +33,18 @@ class Planner(Protocol):
     def poll(self) -> list[PlanProgress | PlanReady]: ...
 
 
-class Listener(Protocol):
-    """A passive listener: recorder, log, terminal."""
+class Keeper(Protocol):
+    """A journal. Both methods may raise OSError."""
 
-    def datagram(self, index: int, time_us: int, datagram: bytes) -> None: ...
+    def inputs(self, inputs: Inputs) -> None:
+        """Before a step."""
 
-    def snapshot(self, snapshot: Snapshot) -> None: ...
-
-    def event(self, event: Event) -> None: ...
-
-    def progress(self, progress: PlanProgress) -> None: ...
-
-    def plan(self, answer: PlanReady) -> None: ...
-
-    def result(self, outcome: Mapping[str, Any]) -> None: ...
+    def outputs(self, sent: Datagrams, events: Sequence[Event]) -> None:
+        """After it, before anything is sent."""
 
 
 class StationNode:
-    """One station with a link per vehicle, in fleet order."""
+    """One station with a link per vehicle, in fleet order. With a `key` all of them are signed."""
 
     def __init__(
         self,
@@ -52,64 +52,149 @@ class StationNode:
         links: Sequence[Link],
         planner: Planner,
         listeners: Sequence[Listener],
+        journal: Keeper | None = None,
+        key: bytes | None = None,
     ) -> None:
         self.station = Station(view)
         self._sysids = [m.sysid for m in view.fleet]
-        self._links, self._planner, self._listeners = links, planner, listeners
-        self._decoders = [Decoder() for _ in links]
-        self._encoders = [Encoder(view.station_sysid, COMPONENT_GCS) for _ in links]
+        self._links, self._planner, self._journal = links, planner, journal
+        self._listeners = Listeners(listeners)
+        self._epoch_us = 0
+        signings = [self._signing(key, index) for index in range(len(view.fleet))]
+        self._decoders = [Decoder(signing) for signing in signings]
+        self._encoders = [Encoder(view.station_sysid, COMPONENT_GCS, s) for s in signings]
+        self._refusals = Refusals(view)
         self._phases = PhaseTimes()
         self._trainings: list[dict[str, Any]] = []
+        self._waiting: PlanRequest | None = None
         self._ended_s: float | None = None
         self.finished = False
 
     def step(self, wall_s: float, epoch_us: int) -> None:
-        """Receive, decide, send. `epoch_us` stamps the telemetry log."""
-        received = []
-        for index, (link, decoder) in enumerate(zip(self._links, self._decoders, strict=True)):
-            for datagram in link.receive():
-                self._log(index, epoch_us, datagram)
-                received += [(index, message) for message in decoder.decode(datagram)]
-        out = self.station.step(wall_s, received, self._answers())
-        for command in out.commands:
-            index = self._sysids.index(command.sysid)
-            datagram = encode(command, self._encoders[index], self.station.autopilots[index])
+        """Receive, decide, send. `epoch_us` stamps logs and signatures."""
+        self._epoch_us = epoch_us
+        datagrams, heard = self._receive()
+        inputs = Inputs(wall_s, epoch_us, datagrams, self._answers())
+        self._keep(lambda journal: journal.inputs(inputs))
+        out = self._advance(inputs, heard)
+        sent = tuple(self._encoded(out))
+        self._keep(lambda journal: journal.outputs(sent, out.events))
+        for index, datagram in sent:
             self._links[index].send(datagram)
-            self._log(index, epoch_us, datagram)
-        for listener in self._listeners:
-            for event in out.events:
-                listener.event(event)
-            for snapshot in out.snapshots:
-                listener.snapshot(snapshot)
+        self._tell(sent, out)
         if out.request is not None:
             self._planner.submit(out.request)
-        self._phases.at(self.station.desk.phase.name, wall_s, self.station.desk.time_s)
         self._finish()
+        if self._listeners.failure and not self.station.desk.ended:
+            self.station.desk.stop(self._listeners.failure)
 
-    def _answers(self) -> list[PlanReady]:
+    def replay(self, inputs: Inputs) -> Sequence[Event]:
+        """A step of the journal again; what it would send is dropped, what it says is returned."""
+        self._epoch_us = inputs.epoch_us
+        heard = [(i, m) for i, data in inputs.datagrams for m in self._decoders[i].decode(data)]
+        self._trainings += map(training, inputs.answers)
+        return self._advance(inputs, heard).events
+
+    def take_over(
+        self,
+        links: Sequence[Link],
+        planner: Planner,
+        listeners: Sequence[Listener],
+        journal: Keeper | None,
+    ) -> None:
+        """From a replay to life: the planner is asked again what it had not answered."""
+        self._links, self._planner, self._journal = links, planner, journal
+        self._listeners = Listeners(listeners)
+        if self._waiting is not None:
+            planner.submit(self._waiting)
+
+    def is_welcome(self, index: int, datagram: bytes) -> bool:
+        """Whether what comes from a new address may come from that vehicle."""
+        return any(m.sysid == self._sysids[index] for m in self._decoders[index].peek(datagram))
+
+    def hear_of(self, index: int, sysid: int) -> None:
+        """Somebody who is not of the fleet speaks where a vehicle should."""
+        if sysid == self.station.desk.view.station_sysid:
+            self._refusals.namesake(index)
+
+    def _signing(self, key: bytes | None, index: int) -> Signing | None:
+        """On the clock of the steps, so that a replay judges stamps as it did the first time."""
+        if key is None:
+            return None
+        return Signing(key, index % 256, lambda: ticks(self._epoch_us / 1e6))
+
+    def _receive(self) -> tuple[Datagrams, Heard]:
+        """The datagrams that said something, and what they said; logs get all of them."""
+        kept: list[tuple[int, bytes]] = []
+        heard: Heard = []
+        for index, (link, decoder) in enumerate(zip(self._links, self._decoders, strict=True)):
+            for datagram in link.receive():
+                self._log(index, datagram)
+                messages = decoder.decode(datagram)
+                if messages:
+                    kept.append((index, datagram))
+                    heard += [(index, message) for message in messages]
+        return tuple(kept), heard
+
+    def _advance(self, inputs: Inputs, heard: Heard) -> Outputs:
+        out = self.station.step(inputs.wall_s, heard, inputs.answers)
+        if out.request is not None:
+            self._waiting = out.request
+        elif self._waiting and any(a.number == self._waiting.number for a in inputs.answers):
+            self._waiting = None
+        desk = self.station.desk
+        self._phases.at(desk.phase.name, inputs.wall_s, desk.time_s)
+        if desk.ended and self._ended_s is None:
+            self._ended_s = desk.time_s
+        return out
+
+    def _encoded(self, out: Outputs) -> list[tuple[int, bytes]]:
+        sent = []
+        for command in out.commands:
+            index = self._sysids.index(command.sysid)
+            sent.append(
+                (index, encode(command, self._encoders[index], self.station.autopilots[index]))
+            )
+        return sent
+
+    def _tell(self, sent: Datagrams, out: Outputs) -> None:
+        for index, datagram in sent:
+            self._log(index, datagram)
+        desk = self.station.desk
+        refused = self._refusals.told(self._decoders, desk.time_s, self._epoch_us)
+        for event in (*out.events, *refused):
+            self._listeners.event(event)
+        for snapshot in out.snapshots:
+            self._listeners.snapshot(snapshot)
+
+    def _answers(self) -> tuple[PlanReady, ...]:
         answers = []
         for message in self._planner.poll():
             if isinstance(message, PlanReady):
                 answers.append(message)
                 self._trainings.append(training(message))
-                for listener in self._listeners:
-                    listener.plan(message)
+                self._listeners.plan(message)
             else:
-                for listener in self._listeners:
-                    listener.progress(message)
-        return answers
+                self._listeners.progress(message)
+        return tuple(answers)
 
     def _finish(self) -> None:
-        if not self.station.desk.ended or self.finished:
+        if self._ended_s is None or self.finished:
             return
-        if self._ended_s is None:
-            self._ended_s = self.station.desk.time_s
         if self.station.desk.time_s - self._ended_s >= LINGER_S:
             self.finished = True
             told = outcome(self.station.desk, self._phases, self._trainings)
-            for listener in self._listeners:
-                listener.result(told)
+            self._listeners.result(told)
 
-    def _log(self, index: int, epoch_us: int, datagram: bytes) -> None:
-        for listener in self._listeners:
-            listener.datagram(index, epoch_us, datagram)
+    def _keep(self, call: Callable[[Keeper], None]) -> None:
+        """A journal that cannot be written any more is left, and the fleet brought to a hold."""
+        if self._journal is None:
+            return
+        try:
+            call(self._journal)
+        except OSError as error:
+            self._journal = None
+            self._listeners.fail("the journal", error)
+
+    def _log(self, index: int, datagram: bytes) -> None:
+        self._listeners.datagram(index, self._epoch_us, datagram)

@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -17,17 +18,21 @@ import numpy as np
 
 from base_station import twin
 from base_station.execution import hold
+from base_station.journal import Head, Journal, journal_files
 from base_station.listeners import open_listeners
 from base_station.node import StationNode
 from base_station.planner_child import PlannerChild
 from base_station.recording.streams import VIEWER
+from base_station.resuming import Resumed, resume
 from base_station.telemetry import Frame
 from base_station.watch import Baseline, Watch
 from base_station.wiring import open_links
 from hil.errors import HilError, InputError
+from hil.mavlink import read_key
 from hil.options import Parser
 from hil.scenario import StationView, load_station_view
 
+VIEW_FILE = "view.json"
 STEP_S = 0.05  # 20 Hz when nothing arrives
 
 
@@ -55,10 +60,20 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "view",
         type=Path,
+        nargs="?",
         metavar="FLEET",
         help="a fleet file, or what `hil station-view SCENARIO` prints",
     )
     parser.add_argument("--out", type=Path, default=Path("."), help="where logs are written")
+    parser.add_argument(
+        "--resume",
+        type=Path,
+        metavar="DIR",
+        help="go on where the station that wrote into this folder ended",
+    )
+    parser.add_argument(
+        "--signing-key", type=Path, metavar="FILE", help="sign MAVLink with the pass phrase in it"
+    )
     parser.add_argument("--machine", action="store_true", help="JSON lines instead of text")
     parser.add_argument(
         "--viewer",
@@ -68,7 +83,10 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
         help=f"stream to the Rerun viewer there, if one runs; without an address {VIEWER}",
     )
     parser.add_argument("--run-id", default=None, help="recording id, to share one recording")
-    return parser.parse_args(argv)
+    arguments = parser.parse_args(argv)
+    if (arguments.view is None) == (arguments.resume is None):
+        parser.error("give a FLEET, or --resume DIR, one of the two")
+    return arguments
 
 
 def _terminate(_signal: int, _frame: FrameType | None) -> None:
@@ -76,22 +94,66 @@ def _terminate(_signal: int, _frame: FrameType | None) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Raises InputError for a bad view or a busy port, ProcessDiedError when the planner dies."""
-    view = load_station_view(arguments.view)
+    """Raises InputError for bad input or a busy port, ProcessDiedError when the planner dies."""
+    key = None if arguments.signing_key is None else read_key(arguments.signing_key)
+    resumed = None if arguments.resume is None else resume(arguments.resume, key)
+    view = load_station_view(arguments.view) if resumed is None else resumed.view
+    out = arguments.out if resumed is None else arguments.resume
     say = _say_json if arguments.machine else _say_text
     run_id = arguments.run_id or f"station-{os.getpid()}"
     with ExitStack() as stack:
         links = open_links(stack, view)
-        _make_folder(arguments.out)
-        planner = PlannerChild(arguments.view, arguments.out / "planner.log")
+        _make_folder(out)
+        parts = len(journal_files(out)) if resumed else 0
+        journal = _open_journal(out, Head(view.model_dump(mode="json"), parts > 0, key is not None))
+        stack.callback(journal.close)
+        view_file = arguments.view or _written_view(out, view)
+        planner = PlannerChild(view_file, out / "planner.log")
         stack.callback(planner.close)
-        listeners = open_listeners(stack, arguments.out, run_id, view, arguments.viewer, say)
+        listeners = open_listeners(stack, out, run_id, view, arguments.viewer, say, parts)
         _compile_twin(view)
-        node = StationNode(view, links, planner, listeners)
+        offset_s = 0.0
+        if resumed is None:
+            node = StationNode(view, links, planner, listeners, journal, key)
+        else:
+            node = resumed.node
+            node.take_over(links, planner, listeners, journal)
+            offset_s = resumed.wall_offset_s(time.monotonic(), time.time_ns() // 1000)
+            _say_resumed(resumed)
+        for index, link in enumerate(links):
+            link.guard(partial(node.is_welcome, index), partial(node.hear_of, index))
         say({"type": "ready", "planner_pid": planner.pid})
         while not node.finished:
             select.select([*(link.fileno() for link in links), planner.fileno()], [], [], STEP_S)
-            node.step(time.monotonic(), time.time_ns() // 1000)
+            node.step(time.monotonic() + offset_s, time.time_ns() // 1000)
+
+
+def _open_journal(out: Path, head: Head) -> Journal:
+    try:
+        return Journal(out, head)
+    except OSError as error:
+        raise InputError(
+            f"{out}: the journal cannot be written: {error.strerror}; choose another folder"
+        ) from None
+
+
+def _written_view(out: Path, view: StationView) -> Path:
+    """The view as a file, which the planner reads."""
+    path = out / VIEW_FILE
+    if not path.exists():
+        path.write_text(view.model_dump_json(indent=2), encoding="utf-8")
+    return path
+
+
+def _say_resumed(resumed: Resumed) -> None:
+    print(f"resumed after {resumed.steps} steps", file=sys.stderr, flush=True)
+    if resumed.differs:
+        print(
+            f"the journal tells of an event that this station would not have told: "
+            f"{resumed.differs}; was it another version?",
+            file=sys.stderr,
+            flush=True,
+        )
 
 
 def _make_folder(out: Path) -> None:

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 from base_station import doubt as doubts
 from base_station.commander import Commander
-from base_station.commands import AskTime, Command, Heartbeat
+from base_station.commands import AskTime, Command, Drive, Heartbeat
 from base_station.desk import Desk
 from base_station.execution import Orders
 from base_station.fleet import LINK_LOST_WALL_S
+from base_station.gaps import GAP_S, Gap, bridge, out_of_touch_since_s
 from base_station.phases import (
     Arming,
     Concluding,
@@ -39,6 +40,7 @@ from hil.scenario import StationView
 
 HEARTBEAT_S = 1.0
 TIMESYNC_S = 1.0
+ABSENT_S = 1.0  # of wall time between two steps: the station itself was not running
 CONTACT_GAP_S = 1.0  # two touches of a pair closer in time than this are one
 
 
@@ -77,6 +79,14 @@ class Station:
         self._touched_s: dict[tuple[int, int], float] = {}
         self._beats_s = (float("-inf"), float("-inf"))  # last heartbeat: wall, fleet
         self._asked_time_s = float("-inf")
+        self._stepped_wall_s: float | None = None
+        self._gap: Gap | None = None
+
+    def interrupted(self) -> None:
+        """The station died after its last step, and lives again after a gap."""
+        self.desk.say("link", "the station was restarted: it holds the fleet, and goes on")
+        if self.desk.watching:
+            self._open_gap(self.desk.time_s)
 
     def step(
         self,
@@ -91,6 +101,7 @@ class Station:
         desk = self.desk
         commands: list[Command] = []
         snapshots: list[Snapshot] = []
+        self._excuse_absence(wall_s)
         desk.answers.update({a.number: a for a in answers})
         for index, message in received:
             desk.fleet.receive(index, message, wall_s)
@@ -101,10 +112,19 @@ class Station:
         if isinstance(desk.phase, Connecting | Arming):
             commands += self._prepare(wall_s)
             commands += self._get_ready(desk, self._commander)
-        for frame in desk.fleet.due() if desk.watching else ():
+        frames = desk.fleet.due() if desk.watching else []
+        if frames and frames[-1].time_s - frames[0].time_s > GAP_S:
+            self._open_gap(frames[0].time_s)
+        for frame in frames:
             commands += self._tick(frame)
             snapshots.append(snapshot(desk, frame))
-        return Outputs(tuple(commands), desk.take_request(), desk.take_events(), tuple(snapshots))
+        return Outputs(newest(commands), desk.take_request(), desk.take_events(), tuple(snapshots))
+
+    def _excuse_absence(self, wall_s: float) -> None:
+        """Links are not lost while nobody listened to them."""
+        before_s, self._stepped_wall_s = self._stepped_wall_s, wall_s
+        if before_s is not None and wall_s - before_s > ABSENT_S:
+            self.desk.fleet.excuse(wall_s - before_s)
 
     def _prepare(self, wall_s: float) -> list[Command]:
         commands: list[Command] = []
@@ -147,16 +167,35 @@ class Station:
 
     def _tick(self, frame: Frame) -> list[Command]:
         desk = self.desk
-        alarms = desk.watch.tick(frame, desk.orders)
+        silent_since_s = out_of_touch_since_s(desk, frame)
+        if silent_since_s is not None:
+            self._open_gap(silent_since_s)
+        obeyed = desk.orders if self._gap is None else self._gap.obeyed(frame, desk.orders)
+        alarms = desk.watch.tick(frame, obeyed)
         if desk.doubt is not None:
-            desk.doubt = doubts.tick(desk.doubt, frame, desk.orders, desk.fleet.period_s)
-        else:
+            desk.doubt = doubts.tick(desk.doubt, frame, obeyed, desk.fleet.period_s)
+        elif self._gap is None:
             self._take_alarms(alarms)
         self._note_contacts(frame)
         self._let_go_of_the_taken(frame)
-        self._mind_the_time()
-        desk.orders = self._decide(desk, frame)
+        if self._gap is None:
+            self._mind_the_time()
+            desk.orders = self._decide(desk, frame)
+        else:
+            self._mind_the_gap(self._gap.at(frame), frame)
         return self._commander.carry_out(desk.orders, desk.fleet.tracks, frame.time_s)
+
+    def _open_gap(self, since_s: float) -> None:
+        if self._gap is None and not self.desk.ended:
+            self._gap = Gap(since_s, self.desk.orders)
+
+    def _mind_the_gap(self, gap: Gap, frame: Frame) -> None:
+        """Everybody holds until all are heard again and at rest."""
+        self.desk.orders = self.desk.hold()
+        over = gap.is_over(frame) or self.desk.ended
+        self._gap = None if over else gap
+        if over and not self.desk.ended:
+            bridge(self.desk, gap, frame)
 
     def _take_alarms(self, alarms: Sequence[int]) -> None:
         desk, cusum = self.desk, self.desk.watch.cusum
@@ -205,6 +244,12 @@ class Station:
             desk.mission_s += desk.fleet.period_s
             if desk.mission_s > desk.view.limits.mission_timeout_s:
                 desk.stop(f"mission not done after {desk.mission_s:.0f} s")
+
+
+def newest(commands: Sequence[Command]) -> tuple[Command, ...]:
+    """Without the set-points that later ones of the same step overtake: nobody obeys old ones."""
+    last = {c.sysid: c for c in commands if isinstance(c, Drive)}
+    return tuple(c for c in commands if not isinstance(c, Drive) or c is last[c.sysid])
 
 
 def own_decision(desk: Desk, frame: Frame) -> Orders:

@@ -1,5 +1,6 @@
 """Telemetry logs as ground stations write them: a time stamp and a raw MAVLink frame, repeated."""
 
+import os
 import struct
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,8 +18,12 @@ _V1_OVERHEAD, _V2_OVERHEAD, _SIGNATURE = 8, 12, 13  # bytes around the payload
 class TlogWriter:
     """Both directions of one link in one file; what is older than 1 s is on disk."""
 
-    def __init__(self, path: Path) -> None:
-        self._file = path.open("wb")
+    def __init__(self, path: Path, append: bool = False) -> None:
+        """`append` goes on with what there is, without a frame that was cut off."""
+        if append and path.exists():
+            whole = sum(_STAMP.size + len(frame) for _, frame in read_tlog(path))
+            os.truncate(path, whole)
+        self._file = path.open("ab" if append else "wb")
         self._flushed_us = 0
 
     def write(self, time_us: int, frame: bytes) -> None:

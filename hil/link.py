@@ -10,6 +10,8 @@ from typing import Protocol, Self
 Address = tuple[str, int]
 MAX_GUESTS = 4
 GUEST_FORGOTTEN_S = 30.0
+PEER_FORGOTTEN_S = 2.0
+LOCALHOST = "127.0.0.1"
 
 # Where processes started by hand meet: the ports of ArduPilot's simulator, of QGroundControl, and
 # of our own. Vehicle i of the fleet uses base + 10 i.
@@ -48,11 +50,24 @@ class MemoryLink:
 
 
 class UdpLink:
-    """A UDP socket with one peer: given (`connect`), or learnt from the last sender (`bind`)."""
+    """A UDP socket with one peer: given (`connect`), or the first who is welcome (`bind`).
 
-    def __init__(self, sock: socket.socket, peer: Address | None) -> None:
+    Nobody takes a peer's place while it speaks: what others send is dropped unread. After
+    PEER_FORGOTTEN_S of silence, whoever is welcome then is the peer, as a vehicle that was started
+    again and has another port. `now` is a monotonic clock in seconds.
+    """
+
+    def __init__(
+        self,
+        sock: socket.socket,
+        peer: Address | None,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
         sock.setblocking(False)
-        self._socket, self._peer = sock, peer
+        self._socket, self._peer, self._now = sock, peer, now
+        self._given = peer is not None
+        self._heard_s = -float("inf")
+        self._is_welcome: Callable[[bytes], bool] = lambda _datagram: True
 
     @classmethod
     def bind(cls, host: str, port: int) -> Self:
@@ -67,8 +82,13 @@ class UdpLink:
 
     @classmethod
     def connect(cls, host: str, port: int) -> Self:
-        """Speak to a known address."""
-        return cls(socket.socket(socket.AF_INET, socket.SOCK_DGRAM), (host, port))
+        """Speak to a known address, and listen to nobody else. Raises OSError."""
+        address = (socket.gethostbyname(host), port)
+        return cls(socket.socket(socket.AF_INET, socket.SOCK_DGRAM), address)
+
+    def guard(self, is_welcome: Callable[[bytes], bool]) -> None:
+        """Who may become the peer: those whose datagram this says of that it is welcome."""
+        self._is_welcome = is_welcome
 
     def fileno(self) -> int:
         """For `select`."""
@@ -90,8 +110,19 @@ class UdpLink:
                 return datagrams
             except ConnectionRefusedError:
                 continue  # the peer was not there for an earlier datagram
-            self._peer = sender
-            datagrams.append(data)
+            if self._is_peer(sender, data):
+                self._heard_s = self._now()
+                datagrams.append(data)
+
+    def _is_peer(self, sender: Address, data: bytes) -> bool:
+        if sender == self._peer:
+            return True
+        if self._given or not self._is_welcome(data):
+            return False
+        if self._peer is not None and self._now() - self._heard_s <= PEER_FORGOTTEN_S:
+            return False
+        self._peer = sender
+        return True
 
     def close(self) -> None:
         self._socket.close()

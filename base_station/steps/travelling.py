@@ -90,6 +90,11 @@ def _plan_mission_again(desk: Desk, why: str) -> None:
         desk.stop(f"mission given up: {why}")
         return
     desk.say("text", f"{why}: planning the mission again from here")
+    plan_from_here(desk)
+
+
+def plan_from_here(desk: Desk) -> None:
+    """[3] Ask for a plan for what is still to be done."""
     desk.goals = desk.goals.only_still_there(desk.watch.state)
     request_beta(desk)
 

@@ -15,9 +15,17 @@ class Leash:
         self.until_s = 0.0
         self._pace = speed or 1.0
         self._learning: tuple[float, float] | None = None  # wall and world time of its beginning
+        self._absent: tuple[float, float] | None = None  # the same of its being away
+
+    def go_on(self, now_s: float) -> None:
+        """The station is being started again: the world does not wait for it, as no world does."""
+        self._absent = self._absent or (now_s, self.until_s)
+        since_s, from_s = self._absent
+        self.until_s = max(self.until_s, from_s + (now_s - since_s) * self._pace)
 
     def lengthen(self, tick_s: float | None, learning: bool, now_s: float) -> bool:
         """Take the station's last tick; whether the leash is longer now."""
+        self._absent = None
         until_s = FIRST_LEASH_S if tick_s is None else tick_s + LEASH_S
         if not learning:
             self._learning = None

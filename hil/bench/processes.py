@@ -20,13 +20,17 @@ SHELL_TRACES = ("PWD", "OLDPWD", "_")
 
 @dataclass(frozen=True)
 class Command:
-    """A process to start; its stderr goes to `log`."""
+    """A process to start; its stderr goes to `log`.
+
+    `again` is how it is started again should a signal end it; without, that ends the run.
+    """
 
     name: str
     argv: tuple[str, ...]
     log: Path
     cwd: Path | None = None
     takes_lines: bool = False
+    again: tuple[str, ...] | None = None
 
 
 def _environment() -> dict[str, str]:
@@ -38,15 +42,30 @@ class Child:
     """One running process in a group of its own."""
 
     def __init__(self, command: Command) -> None:
-        self.name, self.log = command.name, command.log
-        self.ready = False
+        self.name, self.log, self._command = command.name, command.log, command
         self.may_end = False
+        self._start(command.argv, "wb")
+
+    @property
+    def may_start_again(self) -> bool:
+        """A signal ended it, and it knows how to go on."""
+        return self._command.again is not None and (self.process.poll() or 0) < 0
+
+    def start_again(self) -> None:
+        """In the same place; what it said in half is lost."""
+        assert self._command.again is not None
+        self.signal_group(signal.SIGKILL)
+        self.close()
+        self._start(self._command.again, "ab")
+
+    def _start(self, argv: tuple[str, ...], log_mode: str) -> None:
+        self.ready = False
         self._rest = b""
-        with command.log.open("wb") as log:
+        with self.log.open(log_mode) as log:
             self.process = subprocess.Popen(
-                command.argv,
-                cwd=command.cwd,
-                stdin=subprocess.PIPE if command.takes_lines else subprocess.DEVNULL,
+                argv,
+                cwd=self._command.cwd,
+                stdin=subprocess.PIPE if self._command.takes_lines else subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=log,
                 bufsize=0,
@@ -125,6 +144,12 @@ class Children:
         self._selector.register(child.stdout, selectors.EVENT_READ, child)
         return child
 
+    def _start_again(self, child: Child) -> None:
+        if child.stdout in self._selector.get_map():
+            self._selector.unregister(child.stdout)
+        child.start_again()
+        self._selector.register(child.stdout, selectors.EVENT_READ, child)
+
     def pump(self, timeout_s: float) -> None:
         """Hear what the children say. Raises ProcessDiedError when one has died."""
         for key, _ in self._selector.select(timeout_s):
@@ -134,8 +159,11 @@ class Children:
             if death is None or child.may_end:
                 continue
             self._hear(child)
-            if not child.may_end:  # its last line may have been its farewell
+            if child.may_end:  # its last line may have been its farewell
+                continue
+            if not child.may_start_again:
                 raise ProcessDiedError(death)
+            self._start_again(child)
 
     def wait_ready(self, within_s: float) -> None:
         """Until all have said `ready`. Raises ProcessDiedError naming who has not."""

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from base_station.node import Listener, StationNode
+from base_station.listening import Listener
+from base_station.node import Keeper, StationNode
 from base_station.planning.planner import plan
 from base_station.planning.requests import PlanProgress, PlanReady, PlanRequest, decode, encode
 from hil.impairment import impaired
@@ -73,20 +74,22 @@ class Rig:
         view: StationView,
         listeners: Sequence[Listener],
         learn: Learn = plan,
+        journal: Keeper | None = None,
     ) -> None:
         self._scenario = scenario
         self.simulation = Simulation(scenario, scenario.seed)
+        self.station_links: list[Link] = []
         self._seats: dict[int, _Seat] = {}
-        station_links, self.injector_links = [], []
+        self.injector_links: list[Link] = []
         for v in scenario.fleet:
             ours, theirs = MemoryLink.pair()
             breaker, broken = MemoryLink.pair()
             radio = impaired(theirs, scenario, v.sysid, lambda: self.time_s)
             self._seats[v.sysid] = _Seat(Vehicle(scenario, v.sysid), radio, broken)
-            station_links.append(ours)
+            self.station_links.append(ours)
             self.injector_links.append(breaker)
         self.planner = InlinePlanner(view, learn)
-        self.node = StationNode(view, station_links, self.planner, listeners)
+        self.node = StationNode(view, self.station_links, self.planner, listeners, journal)
         self._send_frames()
 
     def vehicle(self, sysid: int) -> Vehicle:

@@ -15,6 +15,10 @@ class Watchdog:
         self._last: tuple[float, float | None] = (0.0, None)
         self._since_s = now_s
 
+    def rest(self, now_s: float) -> None:
+        """Somebody is being started again: patience begins anew."""
+        self._since_s = now_s
+
     def check(self, world_s: float, leash_s: float, tick_s: float | None, now_s: float) -> None:
         """Raises ProcessDiedError naming who hangs; `leash_s` is where the world has to wait."""
         if (world_s, tick_s) != self._last:

@@ -49,7 +49,9 @@ from hil.mavlink.frame import (
     Decoder,
     Other,
     Received,
+    Refusal,
 )
+from hil.mavlink.key_file import read_key
 from hil.mavlink.message import (
     Message,
     Vector,
@@ -185,6 +187,7 @@ __all__ = [
     "RcChannels",
     "RcOverride",
     "Received",
+    "Refusal",
     "RequestDataStream",
     "Result",
     "RoverMode",
@@ -202,6 +205,7 @@ __all__ = [
     "Vector",
     "VfrHud",
     "key_of",
+    "read_key",
     "stick",
     "ticks",
 ]

@@ -4,9 +4,12 @@ Frames are cut and checked here rather than by pymavlink's stream parser, becaus
 alone: nothing of a bad one may leak into the next.
 """
 
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from struct import Struct
-from typing import Any
+from typing import Any, Literal
 
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import ardupilotmega
@@ -19,6 +22,8 @@ MARKER_V1, MARKER_V2 = 0xFE, 0xFD
 HEADER_V1, HEADER_V2 = 6, 10  # bytes, with the marker
 CHECKSUM = 2
 FLAG_SIGNED = 1
+
+Refusal = Literal["unsigned", "forged", "replayed"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +63,7 @@ _LAYOUTS = {
 
 
 class Decoder:
-    """Bytes to values. It keeps no bytes between datagrams; it counts what it dropped.
+    """Bytes to values. It keeps no bytes between datagrams; it counts what it dropped and refused.
 
     A frame whose checksum is wrong is dropped whether or not it says it is signed: MAVLink's C
     parser accepts such a frame when signing is off, and one has disarmed a rover. With `signing`
@@ -68,13 +73,21 @@ class Decoder:
     def __init__(self, signing: Signing | None = None) -> None:
         self._signing = signing
         self.dropped = 0  # stretches of bytes or frames that gave no value
+        self.refused: Counter[Refusal] = Counter()  # those of them that signing refused, and why
 
     def decode(self, datagram: bytes) -> list[Received]:
         """All good frames of one datagram, in order. Never raises."""
+        return self._frames(datagram, remember=True)
+
+    def peek(self, datagram: bytes) -> list[Received]:
+        """What `decode` would return, which may still be called: no signature is remembered."""
+        return self._frames(datagram, remember=False)
+
+    def _frames(self, datagram: bytes, remember: bool) -> list[Received]:
         received = []
         at = 0
         while at < len(datagram):
-            end, value = _frame_at(datagram, at, self._signing)
+            end, value = _frame_at(datagram, at, partial(self._admits, remember=remember))
             if value is not None:
                 received.append(value)
             else:
@@ -82,8 +95,25 @@ class Decoder:
             at = end
         return received
 
+    def _admits(self, frame: bytes, sysid: int, compid: int, remember: bool) -> bool:
+        """Whether signing lets a whole frame in, whose checksum is right."""
+        signing = self._signing
+        if signing is None:
+            return True
+        if frame[0] != MARKER_V2 or not frame[2] & FLAG_SIGNED:
+            self.refused["unsigned"] += 1
+        elif not signing.is_genuine(frame):
+            self.refused["forged"] += 1
+        elif not signing.is_new(frame, sysid, compid):
+            self.refused["replayed"] += 1
+        else:
+            return not remember or signing.accepts(frame, sysid, compid)
+        return False
 
-def _frame_at(data: bytes, at: int, signing: Signing | None) -> tuple[int, Received | None]:
+
+def _frame_at(
+    data: bytes, at: int, admits: Callable[[bytes, int, int], bool]
+) -> tuple[int, Received | None]:
     """Where to look for the next frame, and what the one at `at` says if it is good."""
     if data[at] == MARKER_V2:
         header = HEADER_V2
@@ -107,7 +137,7 @@ def _frame_at(data: bytes, at: int, signing: Signing | None) -> tuple[int, Recei
     checksum = data[payload_end] | data[payload_end + 1] << 8
     if checksum != mcrf4xx(data[at + 1 : payload_end] + layout.crc_extra):
         return _next_marker(data, at + 1), None
-    if signing and not (flags and signing.accepts(data[at:end], sysid, compid)):
+    if not admits(data[at:end], sysid, compid):
         return end, None
     value = _value(layout, data[at + header : payload_end])
     return end, None if value is None else Received(sysid, compid, value)

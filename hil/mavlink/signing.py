@@ -45,20 +45,29 @@ class Signing:
 
     def accepts(self, frame: bytes, sysid: int, compid: int) -> bool:
         """Whether a whole signed frame is genuine and new; it is remembered if so."""
-        if not hmac.compare_digest(self._digest(frame[:-6]), frame[-6:]):
+        if not self.is_genuine(frame) or not self.is_new(frame, sysid, compid):
             return False
-        stamp = int.from_bytes(frame[-12:-6], "little")
-        stream = (sysid, compid, frame[-13])
-        last = self._streams.get(stream)
+        stamp = _stamp(frame)
+        self._streams[sysid, compid, frame[-13]] = stamp
+        self._latest = max(self._latest, stamp)
+        return True
+
+    def is_genuine(self, frame: bytes) -> bool:
+        """Whether who signed a whole frame has the key."""
+        return hmac.compare_digest(self._digest(frame[:-6]), frame[-6:])
+
+    def is_new(self, frame: bytes, sysid: int, compid: int) -> bool:
+        """Whether a whole signed frame is later than all of its stream so far."""
+        last = self._streams.get((sysid, compid, frame[-13]))
         if last is None:
             if len(self._streams) >= MAX_STREAMS:
                 return False
             last = max(self._now(), self._latest) - NEW_STREAM_LAG
-        if stamp <= last:
-            return False
-        self._streams[stream] = stamp
-        self._latest = max(self._latest, stamp)
-        return True
+        return _stamp(frame) > last
 
     def _digest(self, signed: bytes) -> bytes:
         return hashlib.sha256(self._key + signed).digest()[:6]
+
+
+def _stamp(frame: bytes) -> int:
+    return int.from_bytes(frame[-12:-6], "little")

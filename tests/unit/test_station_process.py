@@ -54,7 +54,8 @@ def test_bad_views(
 
 
 def test_bad_options(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "required: FLEET" in refused(capsys)
+    assert "--resume DIR" in refused(capsys)
+    assert "--resume DIR" in refused(capsys, "view.json", "--resume", "there")
     assert "--colour" in refused(capsys, "view.json", "--colour")
 
 

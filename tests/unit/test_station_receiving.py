@@ -91,8 +91,25 @@ def test_a_vehicle_that_falls_silent_is_named_and_the_fleet_holds(rescue_view: S
         return [e.text for e in station.step(wall_s, received).events]
 
     assert hear((0, 1, 2), 0.0) == []
-    assert hear((0, 2), LINK_LOST_WALL_S) == []
+    for k in range(1, 11):
+        assert hear((0, 2), LINK_LOST_WALL_S * k / 10) == []
     texts = hear((0, 2), LINK_LOST_WALL_S + 0.1)
     assert texts[0] == "no word from rover_2 for 5 s"
     assert station.desk.ended
     assert hear((0, 2), LINK_LOST_WALL_S + 1.0) == []
+
+
+def test_silence_does_not_count_while_the_station_itself_is_not_running(
+    rescue_view: StationView,
+) -> None:
+    station = Station(rescue_view)
+    beat = Heartbeat(10, 3, False, 4, 3)
+    heard = [
+        (i, Received(m.sysid, COMPONENT_AUTOPILOT, beat)) for i, m in enumerate(rescue_view.fleet)
+    ]
+    station.step(0.0, heard)
+    assert station.step(100.0, ()).events == ()
+    for k in range(1, 10):
+        assert station.step(100.0 + k / 2, ()).events == ()
+    texts = [e.text for e in station.step(100.0 + LINK_LOST_WALL_S + 0.1, ()).events]
+    assert texts[0] == "no word from rover_1, rover_2, rover_3 for 5 s"

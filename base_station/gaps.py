@@ -1,0 +1,115 @@
+"""When the station and a vehicle were out of touch: hold, wait, and go on from what is there now.
+
+A gap is there when the station was not running (killed and resumed, or starved) or has not heard
+of a vehicle for a while. Through it the twins are moved on under what the vehicles obeyed: their
+last set-point, for as long as an autopilot keeps one, then nothing. When all are heard again and
+have come to rest, what was believed of the trusted axes is drawn to the reports, the statistic
+starts anew, and the mission goes on where it was. So a jump in time does not look like a fault.
+"""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from base_station import detection, execution, twin
+from base_station.desk import Desk
+from base_station.execution import Orders
+from base_station.hypotheses import nominal
+from base_station.phases import AnyPhase, Concluding, Experimenting, OnMission, Probing
+from base_station.steps.travelling import plan_from_here
+from base_station.telemetry import Frame
+from base_station.watch import correct
+
+Array = NDArray[np.float64]
+
+GAP_S = 1.0  # of fleet time without reports
+SETPOINT_KEPT_S = 3.0  # an autopilot forgets a set-point that is older (ArduPilot: GUIDED)
+
+
+@dataclass(frozen=True, eq=False)
+class Gap:
+    """Since when, under which orders, and since when all vehicles have been heard again."""
+
+    since_s: float
+    orders: Orders
+    heard_since_s: float | None = None
+
+    def obeyed(self, frame: Frame, sent: Orders) -> Orders:
+        """What the vehicles did up to `frame`, of which `sent` reached those that are heard."""
+        count = len(frame.fresh)
+        keep = frame.time_s - self.since_s <= SETPOINT_KEPT_S
+        before = self.orders if keep else execution.hold(count)
+        here = frame.fresh
+        return Orders(
+            np.where(here[:, None], sent.setpoints, before.setpoints),
+            np.where(here, sent.driven, before.driven),
+        )
+
+    def at(self, frame: Frame) -> "Gap":
+        if not frame.fresh.all():
+            return replace(self, heard_since_s=None)
+        since_s = frame.time_s if self.heard_since_s is None else self.heard_since_s
+        return replace(self, heard_since_s=since_s)
+
+    def is_over(self, frame: Frame) -> bool:
+        """Heard, and at rest: in HOLD for long enough."""
+        since_s = self.heard_since_s
+        return since_s is not None and frame.time_s - since_s >= execution.REST_S
+
+
+def out_of_touch_since_s(desk: Desk, frame: Frame) -> float | None:
+    """Fleet time of the last report of a vehicle that has been silent for too long."""
+    last_s = min(track.newest_s() for track in desk.fleet.tracks)
+    return last_s if frame.time_s - last_s > GAP_S else None
+
+
+def bridge(desk: Desk, gap: Gap, frame: Frame) -> None:
+    """Anchor what is believed to what is received, and go on."""
+    desk.say("link", f"in touch again after {frame.time_s - gap.since_s:.1f} s: going on")
+    if isinstance(desk.phase, Probing) and desk.alarmed:
+        desk.suspect_the_worst()
+    else:
+        desk.phase = _resumed(desk, gap, frame.time_s)
+    _anchor(desk, frame)
+    if isinstance(desk.phase, OnMission):
+        desk.mission_plans -= 1  # the one that was cut short does not count
+        plan_from_here(desk)
+
+
+def _anchor(desk: Desk, frame: Frame) -> None:
+    watch = desk.watch
+    nothing_more = nominal(desk.view.fleet[0].sysid)
+    trusted = watch.baseline.faults((nothing_more,)).gps_stuck < 0.5
+    at_rest = replace(frame, position_m=desk.mean_report_m())
+    watch.state = _rested(correct(watch.state[None], at_rest, trusted, 1.0)[0])
+    watch.cusum = detection.start(len(frame.fresh), frame.time_s)
+
+
+def _rested(state: Array) -> Array:
+    out = state.copy()
+    for column in (twin.V_NORTH, twin.V_EAST, twin.YAW_RATE, twin.I_X, twin.I_Y):
+        out[..., column] = 0.0
+    return out
+
+
+def _resumed(desk: Desk, gap: Gap, now_s: float) -> AnyPhase:
+    """The phase with its clocks set forward by the gap.
+
+    Half a probe is none, and half an experiment is judged for what it is worth. A policy stopped
+    in the middle of a push was never taught to go on from there: the mission is planned again.
+    """
+    match desk.phase:
+        case Probing():
+            return Probing(now_s)
+        case Experimenting():
+            desk.tries -= 1  # the one that was cut short does not count
+            return Concluding(now_s)
+        case phase:
+            late_s = now_s - gap.since_s
+            clocks = {
+                f.name: getattr(phase, f.name) + late_s
+                for f in fields(phase)
+                if f.name.endswith("_s") and getattr(phase, f.name) is not None
+            }
+            return replace(phase, **clocks) if clocks else phase
