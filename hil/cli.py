@@ -62,6 +62,8 @@ def _run(options: argparse.Namespace) -> int:
             in_memory=options.in_memory,
             viewer=options.viewer,
             serve=options.serve,
+            signing_key=options.signing_key,
+            restart_station=options.restart_station,
         ),
     )
 
@@ -190,6 +192,14 @@ def _parser() -> argparse.ArgumentParser:
         help="open the Rerun viewer and stream to it",
     )
     run.add_argument("--serve", action="store_true", help="offer a web viewer on this machine")
+    run.add_argument(
+        "--signing-key", type=Path, metavar="FILE", help="sign MAVLink with the pass phrase in it"
+    )
+    run.add_argument(
+        "--restart-station",
+        action="store_true",
+        help="a station that was killed is started again, and goes on by its journal",
+    )
     run.set_defaults(command=_run)
 
     campaign = commands.add_parser("campaign", help="many runs in memory: a table and a report")

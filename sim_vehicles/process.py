@@ -23,7 +23,7 @@ from hil.link import (
     UdpHub,
     UdpLink,
 )
-from hil.mavlink import Decoder, Signing, key_of, ticks
+from hil.mavlink import Decoder, Signing, Streams, read_key, ticks
 from hil.options import Parser, port
 from hil.physics_link import PhysicsState
 from hil.scenario import PORTS_PER_VEHICLE, Scenario, load_scenario
@@ -114,7 +114,7 @@ def run(arguments: argparse.Namespace) -> None:
         raise InputError(f"--sysid {arguments.sysid} is not in the fleet; it has {sysids}")
     host = _resolved(arguments.host or scenario.links.host)
     ports = ports_of(scenario, arguments)
-    signing_for = None if arguments.signing_key is None else _signer(arguments.signing_key)
+    signing_for = arguments.signing_key and signer(arguments.signing_key)
     vehicle = Vehicle(scenario, arguments.sysid, signing_for)
     keeper = None if arguments.params is None else ParameterKeeper(arguments.params, vehicle)
     with ExitStack() as stack:
@@ -132,23 +132,18 @@ def run(arguments: argparse.Namespace) -> None:
 SigningFor = Callable[[int], Signing]
 
 
-def _signer(path: Path) -> SigningFor:
+def signer(path: Path) -> SigningFor:
     """Signing for each link with the pass phrase in a file, on the wall clock."""
-    try:
-        phrase = path.read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"--signing-key {path}: cannot be read: {error}") from None
-    if not phrase:
-        raise InputError(f"--signing-key {path}: is empty; it holds a pass phrase")
-    key = key_of(phrase)
-    return lambda link_id: Signing(key, link_id % 256, lambda: ticks(time.time()))
+    key, streams = read_key(path), Streams()
+    return lambda link_id: Signing(key, link_id, lambda: ticks(time.time()), streams)
 
 
 def _hub(host: Address, port: int, signing_for: SigningFor | None) -> UdpHub:
     """A stranger has to say something valid, and signed if we sign, before it is listened to."""
+    decoder = Decoder(signing_for(0) if signing_for else None)
 
     def is_welcome(datagram: bytes) -> bool:
-        return bool(Decoder(signing_for(0) if signing_for else None).decode(datagram))
+        return bool(decoder.peek(datagram))
 
     try:
         return UdpHub.open(host, port, is_welcome)

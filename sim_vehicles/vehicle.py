@@ -44,10 +44,13 @@ from sim_vehicles.telemetry import BUILDERS, Snapshot
 __all__ = ["PortName", "Vehicle"]
 
 
+INJECTOR_LINK = 255  # its number in signatures; stations have those below
+
+
 class Vehicle:
     """One simulated vehicle. `receive` answers at once into the outbox of the same port.
 
-    `signing_for` makes the signing of a station's port; without it nothing is signed.
+    `signing_for` makes the signing of a port by its link id; without it nothing is signed.
     """
 
     def __init__(
@@ -105,14 +108,15 @@ class Vehicle:
         commands = CommandService({**beats.executors(), **self._failures.executors()})
         sizes = ParameterService(self._failures.sizes)
         handlers = merged(*(service.handlers() for service in (commands, sizes, time, ftp)))
-        return Port(self._sysid, handlers, beats)
+        signing = self._signing_for(INJECTOR_LINK) if self._signing_for else None
+        return Port(self._sysid, handlers, beats, signing)
 
     def _station_port(self, peer: int) -> Port:
         """A port for one more station: shared services, streams and signatures of its own."""
         streams = StreamService(self._builders(), default_rates_hz(self._telemetry_hz))
         commands = CommandService({**streams.executors(), **self._executors})
         handlers = merged(self._handlers, commands.handlers(), streams.handlers())
-        signing = self._signing_for(peer) if self._signing_for else None
+        signing = self._signing_for(peer % INJECTOR_LINK) if self._signing_for else None
         return Port(self._sysid, handlers, streams, signing)
 
     @property

@@ -22,6 +22,7 @@ from hil.mavlink import (
     ParamValue,
     Received,
     Result,
+    Signing,
 )
 from hil.scenario import FaultModel, Scenario
 from hil.world.orders import Break, Mend
@@ -85,10 +86,10 @@ Report = Callable[[FaultModel], None]
 class Injector:
     """Injects faults into one vehicle, in the order they are added."""
 
-    def __init__(self, name: str, target: int, sysid: int) -> None:
+    def __init__(self, name: str, target: int, sysid: int, signing: Signing | None = None) -> None:
         self.name, self.target = name, target
-        self._encoder = Encoder(sysid, COMPONENT_GCS)
-        self._decoder = Decoder()
+        self._encoder = Encoder(sysid, COMPONENT_GCS, signing)
+        self._decoder = Decoder(signing)
         self._orders: deque[Order] = deque()
         self._asked_s: float | None = None  # when the first order was first sent
         self._sent_s = -math.inf
@@ -135,7 +136,8 @@ class Breaker:
     """Makes faults happen and end, over one injector per vehicle or by the world.
 
     `struck` gets each fault once its last order has been confirmed, `mended` each that has ended
-    so. The world's orders go to `to_world`, which confirms them by taking them.
+    so. The world's orders go to `to_world`, which confirms them by taking them. `signing` makes the
+    signing of a link; without it nothing is signed.
     """
 
     def __init__(
@@ -144,9 +146,12 @@ class Breaker:
         struck: Report,
         mended: Report,
         to_world: Callable[[Break | Mend], None],
+        signing: Callable[[], Signing | None] | None = None,
     ) -> None:
         sysid = scenario.links.injector_sysid
-        self._injectors = {v.sysid: Injector(v.name, v.sysid, sysid) for v in scenario.fleet}
+        self._injectors = {
+            v.sysid: Injector(v.name, v.sysid, sysid, signing and signing()) for v in scenario.fleet
+        }
         self._waiting: dict[int, list[tuple[Report, FaultModel]]] = {
             v.sysid: [] for v in scenario.fleet
         }

@@ -17,11 +17,12 @@ class Leash:
         self._learning: tuple[float, float] | None = None  # wall and world time of its beginning
         self._absent: tuple[float, float] | None = None  # the same of its being away
 
-    def go_on(self, now_s: float) -> None:
-        """The station is being started again: the world does not wait for it, as no world does."""
+    def go_on(self, now_s: float) -> bool:
+        """The station is being started again: no world waits for that. Whether it is longer now."""
         self._absent = self._absent or (now_s, self.until_s)
         since_s, from_s = self._absent
-        self.until_s = max(self.until_s, from_s + (now_s - since_s) * self._pace)
+        before_s, self.until_s = self.until_s, from_s + (now_s - since_s) * self._pace
+        return self.until_s > before_s
 
     def lengthen(self, tick_s: float | None, learning: bool, now_s: float) -> bool:
         """Take the station's last tick; whether the leash is longer now."""

@@ -3,6 +3,7 @@
 from contextlib import ExitStack
 from pathlib import Path
 
+from base_station.journal import Head, Journal
 from base_station.listeners import open_listeners
 from hil.bench.folders import blind_view
 from hil.bench.injector import Breaker
@@ -23,17 +24,21 @@ def run_in_memory(
     viewer: str | None,
     log: RunLog,
     onsets: Onsets,
+    key: bytes | None = None,
 ) -> None:
     """Until the station has concluded. Raises InputError for a refused fault, ProcessDiedError."""
     with ExitStack() as stack:
         view = blind_view(scenario)
         listeners = open_listeners(stack, folder, run_id, view, viewer, log.station)
-        rig = Rig(scenario, view, listeners)
+        journal = Journal(folder, Head(view.model_dump(mode="json"), signed=key is not None))
+        stack.callback(journal.close)
+        rig = Rig(scenario, view, listeners, journal=journal, key=key)
         breaker = Breaker(
             scenario,
             lambda fault: log.struck(fault, rig.time_s),
             lambda fault: log.mended(fault, rig.time_s),
             rig.simulation.obey,
+            rig.signing,
         )
         breaker.strike(onsets.at_start())
         while not breaker.done:

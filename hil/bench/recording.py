@@ -53,7 +53,8 @@ def merge_recordings(folder: Path) -> Path | None:
     """One mission.rrd out of the parts there are, which go; None when nothing was recorded."""
     from base_station.recording.merge import merge
 
-    parts, target = [folder / STATION_RECORDING, folder / TRUTH_RECORDING], folder / RECORDING
+    stations = [folder / STATION_RECORDING, *sorted(folder.glob("station-[0-9]*.rrd"))]
+    parts, target = [*stations, folder / TRUTH_RECORDING], folder / RECORDING
     try:
         merge(parts, target)
     except FileNotFoundError:

@@ -14,6 +14,7 @@ from base_station.planning.planner import plan
 from base_station.planning.requests import PlanProgress, PlanReady, PlanRequest, decode, encode
 from hil.impairment import impaired
 from hil.link import Link, MemoryLink
+from hil.mavlink import Signing, Streams, ticks
 from hil.physics_link import ServoFrame, decode_state, encode_frame
 from hil.scenario import Scenario, StationView
 from hil.world.simulation import Advance, Simulation
@@ -75,8 +76,9 @@ class Rig:
         listeners: Sequence[Listener],
         learn: Learn = plan,
         journal: Keeper | None = None,
+        key: bytes | None = None,
     ) -> None:
-        self._scenario = scenario
+        self._scenario, self._key = scenario, key
         self.simulation = Simulation(scenario, scenario.seed)
         self.station_links: list[Link] = []
         self._seats: dict[int, _Seat] = {}
@@ -85,12 +87,27 @@ class Rig:
             ours, theirs = MemoryLink.pair()
             breaker, broken = MemoryLink.pair()
             radio = impaired(theirs, scenario, v.sysid, lambda: self.time_s)
-            self._seats[v.sysid] = _Seat(Vehicle(scenario, v.sysid), radio, broken)
+            self._seats[v.sysid] = _Seat(self._vehicle(v.sysid), radio, broken)
             self.station_links.append(ours)
             self.injector_links.append(breaker)
         self.planner = InlinePlanner(view, learn)
-        self.node = StationNode(view, self.station_links, self.planner, listeners, journal)
+        self.node = StationNode(view, self.station_links, self.planner, listeners, journal, key)
         self._send_frames()
+
+    def signing(self) -> Signing | None:
+        """For whoever else speaks here, on simulated time; None when nothing is signed."""
+        return None if self._key is None else Signing(self._key, 0, self._ticks)
+
+    def _ticks(self) -> int:
+        return ticks(EPOCH_US / 1e6 + self.time_s)
+
+    def _vehicle(self, sysid: int) -> Vehicle:
+        if self._key is None:
+            return Vehicle(self._scenario, sysid)
+        key, streams = self._key, Streams()
+        return Vehicle(
+            self._scenario, sysid, lambda link_id: Signing(key, link_id, self._ticks, streams)
+        )
 
     def vehicle(self, sysid: int) -> Vehicle:
         """For tests that speak to a vehicle as a third party would."""

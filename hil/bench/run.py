@@ -27,6 +27,7 @@ from hil.bench.score import score
 from hil.bench.udp import Programs, UdpOptions, run_over_udp
 from hil.bench.viewers import Viewer, live_viewer, until_interrupted
 from hil.errors import EXIT_AS_EXPECTED, EXIT_NOT_AS_EXPECTED, HilError
+from hil.mavlink import read_key
 from hil.scenario import Scenario
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # SIGHUP: the terminal is gone
@@ -49,6 +50,8 @@ class RunOptions:
     in_memory: bool = False
     viewer: bool = False
     serve: bool = False
+    signing_key: Path | None = None
+    restart_station: bool = False
     programs: Programs = field(default_factory=Programs)
 
 
@@ -59,6 +62,8 @@ def run(scenario: Scenario, options: RunOptions, console: Console | None = None)
     or hangs, and Interrupted; what has been recorded by then is kept.
     """
     onsets = Onsets(scenario)
+    if options.signing_key is not None:
+        read_key(options.signing_key)
     folders = choose_folders(scenario, options.out)
     if not options.in_memory:
         scenario = pin_ports(scenario, choose_ports(scenario))
@@ -119,9 +124,16 @@ def _backend(
     if options.in_memory:
         from hil.bench.memory import run_in_memory  # learns in this process: imports torch
 
-        run_in_memory(scenario, folders.station, folders.run_id, viewer.address, log, onsets)
+        key = None if options.signing_key is None else read_key(options.signing_key)
+        run_in_memory(scenario, folders.station, folders.run_id, viewer.address, log, onsets, key)
         return
-    udp = UdpOptions(options.speed, viewer.address, options.programs)
+    udp = UdpOptions(
+        options.speed,
+        viewer.address,
+        options.signing_key,
+        options.restart_station,
+        options.programs,
+    )
     run_over_udp(scenario, folders, udp, log, onsets)
 
 

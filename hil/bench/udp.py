@@ -2,8 +2,10 @@
 
 import sys
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from hil.bench.folders import SCENARIO_FILE, VIEW_FILE, Folders
 from hil.bench.injector import Breaker
@@ -14,6 +16,7 @@ from hil.bench.processes import Child, Children, Command
 from hil.bench.runlog import RunLog
 from hil.bench.watchdog import Watchdog
 from hil.link import UdpLink
+from hil.mavlink import Signing, read_key, ticks
 from hil.scenario import PORTS_PER_VEHICLE, Scenario
 from hil.world.orders import Until, order_line
 from hil.world.truth import TruthRecord, parse_line
@@ -37,6 +40,8 @@ class Programs:
 class UdpOptions:
     speed: float = 1.0
     viewer: str | None = None  # host:port
+    signing_key: Path | None = None
+    restart_station: bool = False  # when a signal has ended it
     programs: Programs = field(default_factory=Programs)
 
 
@@ -48,6 +53,13 @@ def run_over_udp(
     `scenario` has its ports pinned, and its files are in `folders`.
     """
     _Run(scenario, folders, options, log, onsets).go()
+
+
+def _signing(path: Path | None) -> Callable[[], Signing] | None:
+    if path is None:
+        return None
+    key = read_key(path)
+    return lambda: Signing(key, 0, lambda: ticks(time.time()))
 
 
 class _Run:
@@ -67,6 +79,7 @@ class _Run:
             lambda fault: log.struck(fault, log.world_s),
             lambda fault: log.mended(fault, log.world_s),
             lambda order: self._world.send(order_line(order)),
+            _signing(options.signing_key),
         )
         self._injector_links: dict[int, UdpLink] = {}
         self._leash = Leash(options.speed)
@@ -78,7 +91,7 @@ class _Run:
             self._world, station = self._start(children)
             children.wait_ready(READY_WITHIN_S)
             self._break_at_zero(children)
-            self._drive(children)
+            self._drive(children, station)
             children.wait_end(station, FAREWELL_S)
 
     def _start(self, children: Children) -> tuple[Child, Child]:
@@ -93,18 +106,22 @@ class _Run:
                 takes_lines=True,
             )
         )
+        key = self._options.signing_key
+        signing = () if key is None else ("--signing-key", str(key.absolute()))
         for v in self._scenario.fleet:
-            argv = (*programs.vehicle, scenario_file, "--sysid", str(v.sysid))
+            argv = (*programs.vehicle, scenario_file, "--sysid", str(v.sysid), *signing)
             children.start(Command(f"sim-vehicle {v.name}", argv, folder / f"{v.name}.log"))
         viewer = ("--viewer", self._options.viewer) if self._options.viewer else ()
-        identity = ("--run-id", self._folders.run_id)
+        how = ("--machine", "--run-id", self._folders.run_id, *viewer, *signing)
+        again = (*programs.station, "--resume", ".", *how)
         station = children.start(
             Command(
                 STATION,
                 # relative paths: nothing in its arguments tells which scenario this is
-                (*programs.station, VIEW_FILE, "--out", ".", "--machine", *identity, *viewer),
+                (*programs.station, VIEW_FILE, "--out", ".", *how),
                 self._folders.station / "base-station.log",
                 cwd=self._folders.station,
+                again=again if self._options.restart_station else None,
             )
         )
         return world, station
@@ -124,11 +141,16 @@ class _Run:
             self._inject()
             children.pump(POLL_S)
 
-    def _drive(self, children: Children) -> None:
+    def _drive(self, children: Children, station: Child) -> None:
         watchdog = Watchdog(self._options.speed, time.monotonic())
         while self._log.outcome is None:
             now_s = time.monotonic()
-            if self._leash.lengthen(self._log.tick_s, self._log.learning, now_s):
+            if station.ready:
+                longer = self._leash.lengthen(self._log.tick_s, self._log.learning, now_s)
+            else:
+                longer = self._leash.go_on(now_s)
+                watchdog.rest(now_s)
+            if longer:
                 self._world.send(order_line(Until(self._leash.until_s)))
             children.pump(POLL_S)
             self._inject()

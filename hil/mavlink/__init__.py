@@ -96,6 +96,7 @@ from hil.mavlink.services import (
 )
 from hil.mavlink.signing import (
     Signing,
+    Streams,
     key_of,
     ticks,
 )
@@ -198,6 +199,7 @@ __all__ = [
     "Severity",
     "Signing",
     "StatusText",
+    "Streams",
     "SysStatus",
     "SystemStatus",
     "Timesync",

@@ -27,15 +27,23 @@ def key_of(passphrase: str) -> bytes:
     return hashlib.sha256(passphrase.encode()).digest()
 
 
-class Signing:
-    """One link's memory of time stamps. `now` gives the time in ticks; it need not be right."""
+Streams = dict[tuple[int, int, int], int]  # (system, component, link): its last time stamp
 
-    def __init__(self, key: bytes, link_id: int, now: Callable[[], int]) -> None:
+
+class Signing:
+    """One link's memory of time stamps. `now` gives the time in ticks; it need not be right.
+
+    Links of one machine share their `streams`: what was said on one is not said again on another.
+    """
+
+    def __init__(
+        self, key: bytes, link_id: int, now: Callable[[], int], streams: Streams | None = None
+    ) -> None:
         if len(key) != KEY_BYTES:
             raise ValueError(f"a signing key has {KEY_BYTES} bytes, not {len(key)}")
         self._key, self._link_id, self._now = key, link_id, now
         self._latest = 0  # of all stamps sent and accepted
-        self._streams: dict[tuple[int, int, int], int] = {}
+        self._streams: Streams = {} if streams is None else streams
 
     def sign(self, frame: bytes) -> bytes:
         """The frame, whose signed flag is set, with its signature."""

@@ -52,8 +52,8 @@ class Child:
         assert self.process.stdin is not None
         self.process.stdin.close()
 
-    def wait(self) -> int:
-        code = self.process.wait(timeout=LINE_WITHIN_S)
+    def wait(self, within_s: float = LINE_WITHIN_S) -> int:
+        code = self.process.wait(timeout=within_s)
         for thread in self._threads:
             thread.join()
         return code
