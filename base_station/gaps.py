@@ -35,19 +35,23 @@ class Gap:
     orders: Orders
     heard_since_s: float | None = None
 
-    def obeyed(self, frame: Frame, sent: Orders) -> Orders:
-        """What the vehicles did up to `frame`, of which `sent` reached those that are heard."""
+    def obeyed(self, frame: Frame, sent: Orders, live: bool) -> Orders:
+        """What the vehicles did up to `frame`.
+
+        `sent` reached those that are heard, if the frame is `live`: not one that was waiting for
+        a station that did not run.
+        """
         count = len(frame.fresh)
         keep = frame.time_s - self.since_s <= SETPOINT_KEPT_S
         before = self.orders if keep else execution.hold(count)
-        here = frame.fresh
+        here = frame.fresh & live
         return Orders(
             np.where(here[:, None], sent.setpoints, before.setpoints),
             np.where(here, sent.driven, before.driven),
         )
 
-    def at(self, frame: Frame) -> "Gap":
-        if not frame.fresh.all():
+    def at(self, frame: Frame, live: bool) -> "Gap":
+        if not (live and frame.fresh.all()):
             return replace(self, heard_since_s=None)
         since_s = frame.time_s if self.heard_since_s is None else self.heard_since_s
         return replace(self, heard_since_s=since_s)

@@ -170,7 +170,8 @@ class Station:
         silent_since_s = out_of_touch_since_s(desk, frame)
         if silent_since_s is not None:
             self._open_gap(silent_since_s)
-        obeyed = desk.orders if self._gap is None else self._gap.obeyed(frame, desk.orders)
+        live = desk.fleet.newest_s - frame.time_s < GAP_S / 2
+        obeyed = desk.orders if self._gap is None else self._gap.obeyed(frame, desk.orders, live)
         alarms = desk.watch.tick(frame, obeyed)
         if desk.doubt is not None:
             desk.doubt = doubts.tick(desk.doubt, frame, obeyed, desk.fleet.period_s)
@@ -182,7 +183,7 @@ class Station:
             self._mind_the_time()
             desk.orders = self._decide(desk, frame)
         else:
-            self._mind_the_gap(self._gap.at(frame), frame)
+            self._mind_the_gap(self._gap.at(frame, live), frame)
         return self._commander.carry_out(desk.orders, desk.fleet.tracks, frame.time_s)
 
     def _open_gap(self, since_s: float) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from base_station.listeners import Silent
+from base_station.node import Keeper
 from base_station.planning.requests import (
     OpenLoopPlan,
     PlanProgress,
@@ -54,11 +55,16 @@ def scripted(east_mps: float, seconds: float = 4.5) -> Learn:
     return learn
 
 
-def start(scenario: Scenario, learn: Learn) -> tuple[Rig, Heard, Iterator[float]]:
+def start(
+    scenario: Scenario,
+    learn: Learn,
+    journal: Keeper | None = None,
+    key: bytes | None = None,
+) -> tuple[Rig, Heard, Iterator[float]]:
     """A rig whose faults strike as the scenario says; iterate to let time pass (s)."""
     heard = Heard()
-    rig = Rig(scenario, blind_view(scenario), [heard], learn)
-    breaker = Breaker(scenario, lambda _: None, lambda _: None, rig.simulation.obey)
+    rig = Rig(scenario, blind_view(scenario), [heard], learn, journal, key)
+    breaker = Breaker(scenario, lambda _: None, lambda _: None, rig.simulation.obey, rig.signing)
     onsets = Onsets(scenario)
     breaker.strike(onsets.at_start())
 

@@ -11,9 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hil.carriers import open_carrier
+from hil.carriers import UdpCarrier, open_carrier
 from hil.connection import Connection, parse_connection
 from hil.errors import InputError
+from hil.link import PEER_FORGOTTEN_S
 from hil.mavlink import COMPONENT_AUTOPILOT, COMPONENT_GCS, Attitude, Encoder
 from hil.mavlink.stream import FrameCutter, message_id
 from hil.router import Router
@@ -83,6 +84,39 @@ def test_vehicles_that_come_to_one_port_by_themselves_get_their_own_answers(
     ends[1].send(beat)
     assert [vehicles[2].recv(1000) for _ in range(2)] == [order, beat]
     assert vehicles[1].recv(1000) == beat
+
+
+def test_nobody_takes_the_place_of_a_vehicle_that_speaks(stack: ExitStack) -> None:
+    clock = [0.0]
+    sock = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+    sock.bind((HOST, 0))
+    router = Router(UdpCarrier(sock, None), lambda: clock[0])
+    end, others = router.end(1), []
+    end.guard(lambda frame: frame != attitude(1, 66.0), others.append)
+    vehicle, thief = udp(stack), udp(stack)
+    address = sock.getsockname()
+    order = Encoder(250, COMPONENT_GCS).arm(1)
+    thief.sendto(attitude(1, 66.0), address)  # not welcome: it is not the vehicle's
+    vehicle.sendto(attitude(1), address)
+    assert until_heard(router, 1) == [attitude(1)]
+    thief.sendto(attitude(1, 5.0) + Encoder(250, 190).gcs_heartbeat(), address)
+    vehicle.sendto(attitude(1, 2.0), address)
+    assert until_heard(router, 1) == [attitude(1, 2.0)]
+    assert others == [250]
+    end.send(order)
+    assert vehicle.recv(1000) == order
+    clock[0] = PEER_FORGOTTEN_S + 0.1
+    thief.sendto(attitude(1, 5.0), address)  # the vehicle, started again, has another port
+    assert until_heard(router, 1) == [attitude(1, 5.0)]
+    end.send(order)
+    assert thief.recv(1000) == order
+
+
+def until_heard(router: Router, sysid: int) -> list[bytes]:
+    """What the two senders before have sent has all arrived then: loopback keeps their order."""
+    while not (frames := heard(router, sysid)):
+        pass
+    return frames
 
 
 def test_a_client_speaks_first(stack: ExitStack) -> None:

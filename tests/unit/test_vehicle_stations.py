@@ -19,8 +19,10 @@ from hil.mavlink import (
     MissionAck,
     MissionClearAll,
     ParamValue,
+    Severity,
     Signing,
     StatusText,
+    Streams,
     key_of,
 )
 from hil.scenario import Scenario
@@ -89,8 +91,10 @@ def test_with_a_key_only_signed_frames_count(rescue: Scenario) -> None:
     key = key_of("a pass phrase")
     sign: Callable[[int], Signing] = lambda link_id: Signing(key, link_id, lambda: 10**12)  # noqa: E731
     vehicle = Vehicle(rescue, 2, sign)
-    vehicle.receive("gcs", OTHER.request_message(2, MessageId.AUTOPILOT_VERSION))
-    assert vehicle.outbox("gcs") == []
+    for _ in range(3):
+        vehicle.receive("gcs", OTHER.request_message(2, MessageId.AUTOPILOT_VERSION))
+    (told,) = (r.value for d in vehicle.outbox("gcs") for r in Decoder(sign(0)).decode(d))
+    assert told == StatusText(Severity.WARNING, "1 frames refused: not signed")
     signer = Encoder(245, 190, sign(7))
     asked = signer.request_message(2, MessageId.AUTOPILOT_VERSION)
     vehicle.receive("gcs", asked)
@@ -98,6 +102,23 @@ def test_with_a_key_only_signed_frames_count(rescue: Scenario) -> None:
     assert len([r for d in answers for r in Decoder(sign(0)).decode(d)]) == 2
     vehicle.receive("gcs", asked)
     assert vehicle.outbox("gcs") == []
+
+
+def test_what_one_station_has_signed_is_nobody_elses_to_say_again(rescue: Scenario) -> None:
+    streams = Streams()
+    key = key_of("a pass phrase")
+    vehicle = Vehicle(rescue, 2, lambda link_id: Signing(key, link_id, lambda: 10**12, streams))
+    signer = Encoder(250, 190, Signing(key, 7, lambda: 10**12))
+    asked = signer.request_message(2, MessageId.AUTOPILOT_VERSION)
+    vehicle.receive("gcs", asked)
+    assert len(vehicle.outbox("gcs")) == 2
+    vehicle.receive("gcs", asked, peer=1)
+    (told,) = (r.value for d in vehicle.outbox("gcs", 1) for r in Decoder().decode(d))
+    assert told == StatusText(Severity.WARNING, "1 frames refused: signed before")
+    broken = Encoder(251, 190).inject_failure(2, 101, 1, 0)
+    vehicle.receive("injector", broken)
+    (told,) = (r.value for d in vehicle.outbox("injector") for r in Decoder().decode(d))
+    assert told == StatusText(Severity.WARNING, "1 frames refused: not signed")
 
 
 def test_changed_parameters_survive(rescue: Scenario, tmp_path: Path) -> None:

@@ -1,0 +1,171 @@
+"""A station that dies, or starves, in the middle of its work: what it believes and does after."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from base_station.journal import Head, Inputs, Journal, journal_files, read_journal
+from base_station.node import Keeper
+from base_station.resuming import resume
+from hil.bench.folders import blind_view
+from hil.bench.rig import Rig
+from hil.errors import InputError
+from hil.mavlink import Decoder, LocalSetpoint, key_of
+from hil.scenario import Scenario, load_scenario
+from tests.conftest import SCENARIOS
+from tests.scenarios.bench import Heard, run_until_ended, scripted, start
+
+DEAD_S = 4.0
+RIGHT = {"rescue": "motor_y_off", "stuck_gps": "gps_east_stuck"}
+PHASES = {"probe": 7.0, "plan_alpha": 20.0, "experiment": 22.5}
+
+
+class Dead:
+    """In the place of a station that does not run."""
+
+    finished = False
+
+    def step(self, wall_s: float, epoch_us: int) -> None: ...
+
+
+@dataclass
+class Bench:
+    """A rig whose station writes a journal, and may die and live again."""
+
+    scenario: Scenario
+    folder: Path
+    key: bytes | None = None
+    heard: Heard = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.rig, self.heard, self.times = start(
+            self.scenario, scripted(0.8), self._journal(resumed=False), self.key
+        )
+
+    def _journal(self, resumed: bool) -> Keeper:
+        view = blind_view(self.scenario).model_dump(mode="json")
+        return Journal(self.folder, Head(view, resumed, self.key is not None))
+
+    def kill(self) -> None:
+        self.rig.node = Dead()  # type: ignore[assignment]
+
+    def revive(self) -> None:
+        resumed = resume(self.folder, self.key)
+        assert resumed.differs is None
+        for link in self.rig.station_links:
+            link.receive()  # nobody kept these
+        rig, journal = self.rig, self._journal(resumed=True)
+        resumed.node.take_over(rig.station_links, rig.planner, [self.heard], journal)
+        rig.node = resumed.node
+
+
+def until(times: Iterator[float], end_s: float) -> None:
+    for time_s in times:
+        if time_s >= end_s:
+            return
+
+
+def scenario_of(name: str, *overrides: str) -> Scenario:
+    return load_scenario(SCENARIOS / f"{name}.yaml", overrides)
+
+
+@pytest.mark.parametrize("name", RIGHT)
+@pytest.mark.parametrize("phase", PHASES)
+def test_killed_and_resumed_it_believes_the_same_and_finds_the_fault(
+    name: str, phase: str, tmp_path: Path
+) -> None:
+    bench = Bench(scenario_of(name), tmp_path)
+    until(bench.times, PHASES[phase])
+    before = bench.rig.node.station.desk
+    assert before.phase.name == phase
+    bench.kill()
+    until(bench.times, PHASES[phase] + DEAD_S)
+    bench.revive()
+    after = bench.rig.node.station.desk
+    assert after is not before
+    assert after.phase.name == phase
+    assert after.alarmed == before.alarmed
+    np.testing.assert_array_equal(after.watch.state, before.watch.state)
+    if before.doubt is not None:
+        np.testing.assert_array_equal(after.open_doubt.posterior, before.doubt.posterior)
+        np.testing.assert_array_equal(after.open_doubt.states, before.doubt.states)
+    run_until_ended(bench.rig, bench.times)
+    verdict = bench.rig.node.station.desk.verdict
+    assert verdict is not None
+    assert (verdict.sysid, verdict.hypothesis, verdict.decided) == (2, RIGHT[name], True)
+    assert any("in touch again" in text for text in bench.heard.texts("link"))
+
+
+def test_killed_twice_with_signed_links(tmp_path: Path) -> None:
+    key = key_of("a pass phrase")
+    bench = Bench(scenario_of("rescue"), tmp_path, key)
+    for at_s in (6.0, 14.0):
+        until(bench.times, at_s)
+        bench.kill()
+        until(bench.times, at_s + DEAD_S)
+        bench.revive()
+    run_until_ended(bench.rig, bench.times)
+    verdict = bench.rig.node.station.desk.verdict
+    assert verdict is not None
+    assert verdict.hypothesis == "motor_y_off"
+    assert len(journal_files(tmp_path)) == 3
+    with pytest.raises(InputError, match="--signing-key"):
+        resume(tmp_path, None)
+
+
+def test_the_journal_of_a_resumed_station_can_be_resumed_to_the_same(tmp_path: Path) -> None:
+    bench = Bench(scenario_of("rescue"), tmp_path)
+    until(bench.times, 6.0)
+    bench.kill()
+    until(bench.times, 6.0 + DEAD_S)
+    bench.revive()
+    until(bench.times, 20.0)
+    ours = bench.rig.node.station.desk
+    theirs = resume(tmp_path, None).node.station.desk
+    assert theirs.phase.name == ours.phase.name
+    np.testing.assert_array_equal(theirs.watch.state, ours.watch.state)
+    steps = [r for r in read_journal(tmp_path) if isinstance(r, Inputs)]
+    assert steps[-1].wall_s == pytest.approx(20.0, abs=0.1)
+
+
+@pytest.mark.parametrize("name", ["healthy", "rescue"])
+def test_a_starved_station_commands_nothing_stale_and_takes_nothing_for_a_fault(name: str) -> None:
+    rig, heard, times = start(scenario_of(name), scripted(0.8))
+    until(times, 4.1)  # in the middle of a pulse
+    node, rig.node = rig.node, Dead()  # type: ignore[assignment]
+    until(times, 9.1)
+    rig.node = node
+    sent = wiretap(rig)
+    for time_s in times:
+        if time_s >= 9.4:
+            break
+    assert sent
+    assert not [m for m in decoded(sent) if isinstance(m, LocalSetpoint)]
+    run_until_ended(rig, times)
+    verdict = node.station.desk.verdict
+    assert (verdict and verdict.hypothesis) == RIGHT.get(name)
+    assert bool(heard.texts("anomaly")) == (name == "rescue")
+
+
+def wiretap(rig: Rig) -> list[bytes]:
+    """All that the station sends from now on."""
+    sent: list[bytes] = []
+
+    def tapped(send: object) -> object:
+        def both(datagram: bytes) -> None:
+            sent.append(datagram)
+            send(datagram)  # type: ignore[operator]
+
+        return both
+
+    for link in rig.station_links:
+        link.send = tapped(link.send)  # type: ignore[method-assign,assignment]
+    return sent
+
+
+def decoded(datagrams: list[bytes]) -> list[object]:
+    decoder = Decoder()
+    return [m.value for d in datagrams for m in decoder.decode(d)]
