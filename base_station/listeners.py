@@ -44,8 +44,10 @@ class TelemetryLogs(Silent):
         self._logs[index].write(time_us, datagram)
 
     def close(self) -> None:
-        for log in self._logs:
-            log.close()
+        """All of them, even where one cannot write its rest. Raises OSError."""
+        with ExitStack() as stack:
+            for log in self._logs:
+                stack.callback(log.close)
 
 
 class Lines(Silent):

@@ -103,6 +103,9 @@ def run(arguments: argparse.Namespace) -> None:
     run_id = arguments.run_id or f"station-{os.getpid()}"
     with ExitStack() as stack:
         links = open_links(stack, view)
+        for connection in dict.fromkeys(map(view.connection_of, view.fleet)):
+            if connection.kind == "udpin" and not connection.is_on_this_machine:
+                print(f"listens to other machines, too: {connection}", file=sys.stderr, flush=True)
         _make_folder(out)
         parts = len(journal_files(out)) if resumed else 0
         journal = _open_journal(out, Head(view.model_dump(mode="json"), parts > 0, key is not None))

@@ -5,6 +5,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from ipaddress import ip_address
 from typing import Protocol, Self
 
 Address = tuple[str, int]
@@ -12,6 +13,15 @@ MAX_GUESTS = 4
 GUEST_FORGOTTEN_S = 30.0
 PEER_FORGOTTEN_S = 2.0
 LOCALHOST = "127.0.0.1"
+
+
+def is_here(host: str) -> bool:
+    """Whether an address, or name, is one that other machines cannot reach."""
+    try:
+        return ip_address(socket.gethostbyname(host)).is_loopback
+    except (OSError, ValueError):
+        return False
+
 
 # Where processes started by hand meet: the ports of ArduPilot's simulator, of QGroundControl, and
 # of our own. Vehicle i of the fleet uses base + 10 i.
@@ -152,10 +162,13 @@ class UdpHub:
 
     @classmethod
     def open(cls, host: Address, port: int, is_welcome: Callable[[bytes], bool]) -> Self:
-        """Speak to the host, from a port (0: any). Raises OSError when that is taken."""
+        """Speak to the host, from a port (0: any). Raises OSError when that is taken.
+
+        Guests come from this machine only, unless the host is on another.
+        """
         sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
-            sock.bind(("", port))
+            sock.bind((LOCALHOST if is_here(host[0]) else "", port))
         except OSError:
             sock.close()
             raise

@@ -22,6 +22,7 @@ from hil.link import (
     Link,
     UdpHub,
     UdpLink,
+    is_here,
 )
 from hil.mavlink import Decoder, Signing, Streams, read_key, ticks
 from hil.options import Parser, port
@@ -123,7 +124,10 @@ def run(arguments: argparse.Namespace) -> None:
         gcs = _hub((host, ports.mavlink), arguments.listen_port, signing_for)
         stack.callback(gcs.close)
         injector = _bound(host, ports.injector)
+        injector.guard(_welcome(signing_for))
         stack.callback(injector.close)
+        if not is_here(host):
+            print(f"listens to other machines, too, for {host}", file=sys.stderr, flush=True)
         shell = Shell(vehicle, scenario, physics, gcs, injector, keeper)
         print("ready", flush=True)
         shell.serve()
@@ -138,15 +142,16 @@ def signer(path: Path) -> SigningFor:
     return lambda link_id: Signing(key, link_id, lambda: ticks(time.time()), streams)
 
 
+def _welcome(signing_for: SigningFor | None) -> Callable[[bytes], bool]:
+    """Whether a stranger's datagram is valid, and signed if we sign."""
+    decoder = Decoder(signing_for(0) if signing_for else None)
+    return lambda datagram: bool(decoder.peek(datagram))
+
+
 def _hub(host: Address, port: int, signing_for: SigningFor | None) -> UdpHub:
     """A stranger has to say something valid, and signed if we sign, before it is listened to."""
-    decoder = Decoder(signing_for(0) if signing_for else None)
-
-    def is_welcome(datagram: bytes) -> bool:
-        return bool(decoder.peek(datagram))
-
     try:
-        return UdpHub.open(host, port, is_welcome)
+        return UdpHub.open(host, port, _welcome(signing_for))
     except OSError as error:
         raise InputError(
             f"--listen-port {port} cannot be bound: {error.strerror}; choose another"

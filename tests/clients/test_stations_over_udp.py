@@ -71,6 +71,7 @@ def test_guests_come_beside_the_host_and_strangers_get_nothing(tmp_path: Path) -
 def test_with_a_key_only_signed_stations_are_heard(tmp_path: Path) -> None:
     secret = tmp_path / "pass phrase"
     secret.write_text("not to be guessed\n")
+    secret.chmod(0o600)
     options = ("--signing-key", str(secret))
     with (
         lone_vehicle(tmp_path, speed=SPEED, options=options) as ports,
