@@ -1,7 +1,9 @@
-"""Contacts between discs and with walls: search by cells, sequential impulses, no restitution.
+"""Contacts of discs with each other, with walls and with obstacles: found and measured.
 
-A contact is a row: i, j (-1: a wall), normal north, normal east (from i to j), gap (m), and the
-accumulated normal and tangential impulses (N s).
+A contact is a row of `contacts` [C, CONTACT_COLUMNS, lanes] for one pair of blocks of the tile,
+`bodies` [C, 2] (the second is the ground for walls and obstacles). In lanes where the two are out
+of reach it is FAR, and does nothing. Indices of blocks are unsigned: as such they can't count from
+the end, and the compiler sees which columns belong together.
 """
 
 import math
@@ -9,178 +11,168 @@ from typing import Any
 
 import numpy as np
 
-from base_station.twin.compiled import compiled
-from base_station.twin.lump import INVERSE_INERTIA, INVERSE_MASS
-from base_station.twin.state import EAST, NORTH, V_EAST, V_NORTH, YAW_RATE
+from base_station.twin.compiled import inlined
+from base_station.twin.state import EAST, NORTH
+from base_station.twin.tile import BUSY, INVERSE_INERTIA, INVERSE_MASS
 
-ITERATIONS = 12  # enough for a push through a chain of three
-SETTLED_NS = 1e-7
-REACH_M = 0.1  # gaps that can close within a step; above 2 x the fastest vehicle x dt
-CELLS_ABOVE = 16  # below this many vehicles, looking at every pair is cheaper
+NORMAL_N = 0  # unit vector from the first to the second
+NORMAL_E = 1
+GAP = 2  # m
+MAY_CLOSE = 3  # m/s: the gap over dt
+NORMAL_MASS = 4  # kg: impulse per change of the speed along the normal ...
+RIM_MASS = 5  # ... and of the slip of the rims
+IMPULSE = 6  # N s, along the normal; never pulls
+RUB = 7  # N s, across it
+LIGHT_1 = 8  # inverse masses (1/kg), and radius over inertia (1/(kg m)), of both
+LIGHT_2 = 9
+SPIN_1 = 10
+SPIN_2 = 11
+APART = 12  # kg m: what overlaps is moved apart by this times its inverse mass
+GIVEN_N = 13  # N s, in this round: north, east, and across
+GIVEN_E = 14
+GIVEN_RUB = 15
+CONTACT_COLUMNS = 16
+
+FAR_MPS = 1e9
 CORRECTION = 0.5  # share of a penetration removed per step
+CENTRED_M = 1e-9  # nearer than this no direction is right: any one separates the two
+NO_MASS = 1e-30
 
 
-@compiled
-def find_contacts(s: Any, radius: Any, bounds: Any, contacts: Any) -> int:
-    """Fill `contacts` with pairs and walls within reach; returns how many."""
-    count = s.shape[0]
-    if count > CELLS_ABOVE:
-        n = near_pairs_by_cells(s, radius, contacts)
-    else:
-        n = 0
-        for i in range(count):
-            for j in range(i + 1, count):
-                n = add_pair(s, radius, i, j, contacts, n)
-    for i in range(count):
-        north, east, r = s[i, NORTH], s[i, EAST], radius[i]
-        n = add_wall(contacts, n, i, -1.0, 0.0, north - r - bounds[0])
-        n = add_wall(contacts, n, i, 1.0, 0.0, bounds[1] - north - r)
-        n = add_wall(contacts, n, i, 0.0, -1.0, east - r - bounds[2])
-        n = add_wall(contacts, n, i, 0.0, 1.0, bounds[3] - east - r)
-    return n
-
-
-@compiled
-def near_pairs_by_cells(s: Any, radius: Any, contacts: Any) -> int:
-    """Pairs from neighbouring cells of a hashed grid: cost grows linearly in vehicles."""
-    count = s.shape[0]
-    cell = 2.0 * radius.max() + REACH_M
-    buckets = 2 * count
-    head = np.full(buckets, -1, np.int64)
-    following = np.empty(count, np.int64)
-    cells = np.empty((count, 2), np.int64)
-    n = 0
-    for i in range(count):  # each vehicle meets those entered before it
-        a, b = math.floor(s[i, NORTH] / cell), math.floor(s[i, EAST] / cell)
-        for da in range(-1, 2):
-            for db in range(-1, 2):
-                j = head[bucket(a + da, b + db, buckets)]
-                while j >= 0:
-                    if cells[j, 0] == a + da and cells[j, 1] == b + db:
-                        n = add_pair(s, radius, j, i, contacts, n)
-                    j = following[j]
-        k = bucket(a, b, buckets)
-        cells[i, 0], cells[i, 1] = a, b
-        following[i], head[k] = head[k], i
-    return n
-
-
-@compiled
-def bucket(a: int, b: int, buckets: int) -> int:
-    return (a * 73856093 ^ b * 19349663) % buckets
-
-
-@compiled
-def add_pair(s: Any, radius: Any, i: int, j: int, contacts: Any, n: int) -> int:
-    north, east = s[j, NORTH] - s[i, NORTH], s[j, EAST] - s[i, EAST]
-    touch = radius[i] + radius[j]
-    square = north * north + east * east
-    if square >= (touch + REACH_M) ** 2 or n >= contacts.shape[0] - 4 * s.shape[0]:
-        return n
-    distance = math.sqrt(square)
-    if distance < 1e-9:  # no direction is right: any one separates them
-        north, east, distance = 1.0, 0.0, 1.0
-        square = 0.0
-    gap = math.sqrt(square) - touch
-    return add_contact(contacts, n, i, j, north / distance, east / distance, gap)
-
-
-@compiled
-def add_wall(contacts: Any, n: int, i: int, north: float, east: float, gap: float) -> int:
-    if gap >= REACH_M:
-        return n
-    return add_contact(contacts, n, i, -1, north, east, gap)
-
-
-@compiled
-def add_contact(
-    contacts: Any, n: int, i: int, j: int, north: float, east: float, gap: float
+@inlined
+def find_contacts(
+    vehicles: Any, tile: Any, pairs: Any, found: int, contacts: Any, bodies: Any, worlds: Any
 ) -> int:
-    contacts[n, 0], contacts[n, 1] = i, j
-    contacts[n, 2], contacts[n, 3], contacts[n, 4] = north, east, gap
-    contacts[n, 5] = contacts[n, 6] = 0.0
-    return n + 1
+    """Fill `contacts` and `bodies`; returns how many. BUSY becomes 1 in lanes with a contact."""
+    ground, obstacles = tile.shape[0] - 1, vehicles.obstacles_m.shape[0]
+    radius, reach, per_dt = vehicles.radius_m, vehicles.reach_m, 1.0 / vehicles.dt_s
+    n = 0
+    worlds[BUSY] = 0.0
+    for k in range(found + (2 + obstacles) * ground):
+        row = np.uintp(n)
+        if k < found:
+            i, j = pairs[k, 0], pairs[k, 1]
+            near = measure_vehicle(tile, i, j, radius[i] + radius[j], reach, contacts, row)
+        else:
+            side = (k - found) % (2 + obstacles)
+            i, j = np.uintp((k - found) // (2 + obstacles)), np.uintp(ground)
+            if side < 2:
+                near = measure_wall(vehicles.bounds_m, tile, i, np.uintp(side), radius[i], reach, contacts, row)
+            else:
+                stroke = vehicles.obstacles_m[side - 2]
+                near = measure_obstacle(stroke, tile, i, radius[i], reach, contacts, row)
+        if near > 0:
+            bodies[n, 0], bodies[n, 1] = i, j
+            rim = radius[j] if j < ground else 0.0
+            enter(tile, i, j, radius[i], rim, reach, per_dt, contacts, row, worlds)
+            n += 1
+            if n == bodies.shape[0]:
+                break
+    return n
 
 
-@compiled
-def solve_contacts(
-    s: Any, radius: Any, k: Any, friction: float, dt: float, contacts: Any, n: int
+@inlined
+def measure_vehicle(
+    tile: Any, i: int, j: int, touch: float, reach: float, contacts: Any, n: int
+) -> int:
+    """In how many lanes these are within reach, and then normal and gap of contact `n`."""
+    near = 0
+    for lane in range(tile.shape[2]):
+        north = tile[j, NORTH, lane] - tile[i, NORTH, lane]
+        east = tile[j, EAST, lane] - tile[i, EAST, lane]
+        near += north * north + east * east < (touch + reach) * (touch + reach)
+    if near > 0:
+        for lane in range(tile.shape[2]):
+            north = tile[j, NORTH, lane] - tile[i, NORTH, lane]
+            east = tile[j, EAST, lane] - tile[i, EAST, lane]
+            distance = math.sqrt(north * north + east * east)
+            per = 1.0 / max(distance, CENTRED_M)
+            contacts[n, NORMAL_N, lane] = north * per if distance >= CENTRED_M else 1.0
+            contacts[n, NORMAL_E, lane] = east * per
+            contacts[n, GAP, lane] = distance - touch
+    return near
+
+
+@inlined
+def measure_wall(
+    walls: Any, tile: Any, i: int, axis: int, radius: float, reach: float, contacts: Any, n: int
+) -> int:
+    """The same for the nearer wall along an axis: 0 north, 1 east."""
+    is_east = 1.0 if axis > 0 else 0.0
+    low = walls[2] if axis > 0 else walls[0]
+    high = walls[3] if axis > 0 else walls[1]
+    near = 0
+    for lane in range(tile.shape[2]):
+        at = tile[i, axis, lane]
+        near += min(at - low, high - at) < radius + reach
+    if near > 0:
+        for lane in range(tile.shape[2]):
+            to_low, to_high = tile[i, axis, lane] - low, high - tile[i, axis, lane]
+            sign = -1.0 if to_low < to_high else 1.0
+            contacts[n, NORMAL_N, lane] = sign * (1.0 - is_east)
+            contacts[n, NORMAL_E, lane] = sign * is_east
+            contacts[n, GAP, lane] = min(to_low, to_high) - radius
+    return near
+
+
+@inlined
+def measure_obstacle(
+    stroke: Any, tile: Any, i: int, radius: float, reach: float, contacts: Any, n: int
+) -> int:
+    """The same for a stroke of a round brush: what is met is a disc around its nearest point."""
+    along_n, along_e = stroke[2] - stroke[0], stroke[3] - stroke[1]
+    per_square = 1.0 / max(along_n * along_n + along_e * along_e, CENTRED_M * CENTRED_M)
+    touch, near = radius + stroke[4], 0
+    for lane in range(tile.shape[2]):
+        north, east = stroke[0] - tile[i, NORTH, lane], stroke[1] - tile[i, EAST, lane]
+        share = max(0.0, min(1.0, -(north * along_n + east * along_e) * per_square))
+        north, east = north + share * along_n, east + share * along_e
+        distance = math.sqrt(north * north + east * east)
+        per = 1.0 / max(distance, CENTRED_M)
+        near += distance < touch + reach
+        contacts[n, NORMAL_N, lane] = north * per if distance >= CENTRED_M else 1.0
+        contacts[n, NORMAL_E, lane] = east * per
+        contacts[n, GAP, lane] = distance - touch
+    return near
+
+
+@inlined
+def enter(
+    tile: Any,
+    i: int,
+    j: int,
+    rim_i: float,
+    rim_j: float,
+    reach: float,
+    per_dt: float,
+    contacts: Any,
+    n: int,
+    worlds: Any,
 ) -> None:
-    """Change velocities so that no gap closes further than to touch. `k` is the lumped array.
-
-    Coulomb friction is bounded by the normal impulse so far.
-    """
-    for _ in range(ITERATIONS):
-        largest = 0.0
-        for c in range(n):
-            i, j = int(contacts[c, 0]), int(contacts[c, 1])
-            nn, ne = contacts[c, 2], contacts[c, 3]
-            weight = k[i, INVERSE_MASS] + (k[j, INVERSE_MASS] if j >= 0 else 0.0)
-            closing = -relative(s, i, j, nn, ne) - max(contacts[c, 4], 0.0) / dt
-            before = contacts[c, 5]
-            contacts[c, 5] = max(0.0, before + closing / weight)
-            push(s, k, i, j, nn, ne, contacts[c, 5] - before)
-            if contacts[c, 5] > 0.0 or contacts[c, 6] != 0.0:
-                rub(s, radius, k, i, j, friction * contacts[c, 5], weight, contacts, c)
-            largest = max(largest, abs(contacts[c, 5] - before))
-        if largest < SETTLED_NS:
-            break
-
-
-@compiled
-def rub(
-    s: Any, radius: Any, k: Any, i: int, j: int, bound: float, weight: float, contacts: Any, c: int
-) -> None:
-    """The tangential part: against the slip of the rims, up to `bound` (N s)."""
-    nn, ne, ri = contacts[c, 2], contacts[c, 3], radius[i]
-    slip = relative(s, i, j, -ne, nn) - ri * s[i, YAW_RATE]
-    weight += ri * ri * k[i, INVERSE_INERTIA]
-    if j >= 0:
-        slip -= radius[j] * s[j, YAW_RATE]
-        weight += radius[j] * radius[j] * k[j, INVERSE_INERTIA]
-    before = contacts[c, 6]
-    contacts[c, 6] = max(-bound, min(bound, before - slip / weight))
-    change = contacts[c, 6] - before
-    push(s, k, i, j, -ne, nn, change)
-    s[i, YAW_RATE] -= ri * k[i, INVERSE_INERTIA] * change
-    if j >= 0:
-        s[j, YAW_RATE] -= radius[j] * k[j, INVERSE_INERTIA] * change
-
-
-@compiled
-def relative(s: Any, i: int, j: int, north: float, east: float) -> float:
-    """Velocity of j (or of a wall: none) seen from i, along a direction."""
-    speed: float = -(s[i, V_NORTH] * north + s[i, V_EAST] * east)
-    if j >= 0:
-        speed += s[j, V_NORTH] * north + s[j, V_EAST] * east
-    return speed
-
-
-@compiled
-def push(s: Any, k: Any, i: int, j: int, north: float, east: float, impulse: float) -> None:
-    s[i, V_NORTH] -= north * impulse * k[i, INVERSE_MASS]
-    s[i, V_EAST] -= east * impulse * k[i, INVERSE_MASS]
-    if j >= 0:
-        s[j, V_NORTH] += north * impulse * k[j, INVERSE_MASS]
-        s[j, V_EAST] += east * impulse * k[j, INVERSE_MASS]
-
-
-@compiled
-def correct_positions(s: Any, radius: Any, bounds: Any, k: Any, contacts: Any, n: int) -> None:
-    """Move overlapping discs apart, the lighter one further, and put all inside the walls."""
-    for c in range(n):
-        i, j = int(contacts[c, 0]), int(contacts[c, 1])
-        if j < 0:
-            continue
-        north, east = s[j, NORTH] - s[i, NORTH], s[j, EAST] - s[i, EAST]
-        overlap = radius[i] + radius[j] - math.sqrt(north * north + east * east)
-        if overlap > 0.0:
-            move = CORRECTION * overlap / (k[i, INVERSE_MASS] + k[j, INVERSE_MASS])
-            s[i, NORTH] -= contacts[c, 2] * move * k[i, INVERSE_MASS]
-            s[i, EAST] -= contacts[c, 3] * move * k[i, INVERSE_MASS]
-            s[j, NORTH] += contacts[c, 2] * move * k[j, INVERSE_MASS]
-            s[j, EAST] += contacts[c, 3] * move * k[j, INVERSE_MASS]
-    for i in range(s.shape[0]):
-        r = radius[i]
-        s[i, NORTH] = max(bounds[0] + r, min(bounds[1] - r, s[i, NORTH]))
-        s[i, EAST] = max(bounds[2] + r, min(bounds[3] - r, s[i, EAST]))
+    """Complete contact `n`; what overlaps is moved apart a little, the lighter one further."""
+    overlaps = 0
+    for lane in range(tile.shape[2]):
+        gap = contacts[n, GAP, lane]
+        light_i, light_j = tile[i, INVERSE_MASS, lane], tile[j, INVERSE_MASS, lane]
+        spin_i = rim_i * tile[i, INVERSE_INERTIA, lane]
+        spin_j = rim_j * tile[j, INVERSE_INERTIA, lane]
+        mass = 1.0 / max(light_i + light_j, NO_MASS)
+        overlaps += gap < 0.0
+        contacts[n, MAY_CLOSE, lane] = max(gap, 0.0) * per_dt if gap < reach else FAR_MPS
+        contacts[n, NORMAL_MASS, lane] = mass
+        rims = light_i + light_j + rim_i * spin_i + rim_j * spin_j
+        contacts[n, RIM_MASS, lane] = 1.0 / max(rims, NO_MASS)
+        contacts[n, IMPULSE, lane] = contacts[n, RUB, lane] = 0.0
+        contacts[n, LIGHT_1, lane], contacts[n, LIGHT_2, lane] = light_i, light_j
+        contacts[n, SPIN_1, lane], contacts[n, SPIN_2, lane] = spin_i, spin_j
+        contacts[n, APART, lane] = CORRECTION * max(-gap, 0.0) * mass
+        worlds[BUSY, lane] = 1.0 if gap < reach else worlds[BUSY, lane]
+    if overlaps > 0:
+        for lane in range(tile.shape[2]):
+            move = contacts[n, APART, lane] * contacts[n, LIGHT_1, lane]
+            tile[i, NORTH, lane] -= contacts[n, NORMAL_N, lane] * move
+            tile[i, EAST, lane] -= contacts[n, NORMAL_E, lane] * move
+        for lane in range(tile.shape[2]):
+            move = contacts[n, APART, lane] * contacts[n, LIGHT_2, lane]
+            tile[j, NORTH, lane] += contacts[n, NORMAL_N, lane] * move
+            tile[j, EAST, lane] += contacts[n, NORMAL_E, lane] * move

@@ -1,6 +1,8 @@
 """The twin's dynamics: one deterministic kernel, batched over environments x hypotheses.
 
-A step: autopilot, motors, rolling resistance, contacts (sequential impulses), positions.
+A step: autopilot, motors, the ground, contacts (sequential impulses), positions. Worlds are moved
+LANES at a time, each in a lane of a tile (`tile`): one instruction serves all of them. Large
+fleets are moved one world at a time, by the same functions with a single lane.
 """
 
 import math
@@ -8,45 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from base_station.twin.compiled import cached, compiled, sources
-from base_station.twin.contact import correct_positions, find_contacts, solve_contacts
-from base_station.twin.lump import (
-    DAMP,
-    GIVE,
-    LOSS,
-    MIX,
-    PER_SPEED,
-    ROLLING,
-    SPEED_LIMIT,
-    STUCK,
-    YAW_LOSS,
-    columns,
-    lump,
-)
-from base_station.twin.state import (
-    DRIVEN,
-    EAST,
-    I_X,
-    I_Y,
-    NORTH,
-    SP_EAST,
-    SP_NORTH,
-    SP_YAW,
-    V_EAST,
-    V_NORTH,
-    YAW,
-    YAW_RATE,
-)
+from base_station.twin.compiled import cached, compiled, inlined, sources
+from base_station.twin.contact import CONTACT_COLUMNS, IMPULSE, find_contacts
+from base_station.twin.drive import drive, take_commands, wrapped
+from base_station.twin.search import CELLS_ABOVE, all_pairs, near_pairs, pair_capacity
+from base_station.twin.solve import solve_contacts
+from base_station.twin.state import EAST, NORTH, STATE_SIZE, V_EAST, V_NORTH, YAW, YAW_RATE
+from base_station.twin.tile import COLUMNS, FRICTION, WORLD_COLUMNS, face, gather
 
-INTEGRATOR_GAIN = 0.5  # output per (m/s) s
-INTEGRATOR_LIMIT = 0.1
-STANDSTILL_MPS = 0.02  # set-points below this get no feed-forward against rolling resistance
-YAW_GAIN = 2.0
-YAW_RATE_GAIN = 0.5
-YAW_LIMIT = 0.5
+LANES = 16
 
 
-@compiled
+@inlined
 def advance_all(
     vehicles: Any,
     parameters: Any,
@@ -57,151 +32,95 @@ def advance_all(
     steps: int,
     impulses: Any,
     walls: Any,
+    lanes: int,
 ) -> None:
     """`steps` of dt for all rows of `states`, in place; adds to `impulses` and `walls`."""
     rows, count = states.shape[0], states.shape[1]
     draws, hypotheses = parameters.mass_kg.shape[0], faults.power.shape[0]
-    dt, radius, bounds = vehicles.dt_s, vehicles.radius_m, vehicles.bounds_m
-    locked, motors = vehicles.yaw_locked, vehicles.arm_m.shape[1]
-    k = np.empty((count, columns(motors)))
-    contacts = np.empty((min(count * (count - 1) // 2, 10 * count) + 4 * count, 7))
-    for b in range(rows):
-        p, s = b * draws // rows, states[b]
-        lump(vehicles, parameters, faults, p, b % hypotheses, k)
-        delay = round(parameters.latency_s[p] / dt)
-        for step in range(steps):
-            if step == delay:
-                take_commands(s, setpoints[b], driven[b])
+    tile = np.zeros((count + 1, COLUMNS, lanes))
+    draw, hypothesis = np.zeros(lanes, np.int64), np.zeros(lanes, np.int64)
+    due, worlds = np.empty(lanes, np.int64), np.zeros((WORLD_COLUMNS, lanes))
+    pairs = np.empty((pair_capacity(count), 2), np.uintp)
+    found = all_pairs(count, pairs) if count <= CELLS_ABOVE else 0
+    room = pairs.shape[0] + (2 + vehicles.obstacles_m.shape[0]) * count
+    contacts = np.empty((room + 1, CONTACT_COLUMNS, lanes))
+    bodies = np.empty((room, 2), np.uintp)
+    same = draws == 1 and lanes % hypotheses == 0  # every tile has the same constants
+    for first in range(0, rows, lanes):
+        for lane in range(lanes):
+            b = min(first + lane, rows - 1)  # lanes past the end repeat the last row
+            draw[lane], hypothesis[lane] = b * draws // rows, b % hypotheses
+            worlds[FRICTION, lane] = parameters.friction[draw[lane]]
+            due[lane] = min(round(parameters.latency_s[draw[lane]] / vehicles.dt_s), steps)
+            load(states[b], tile, lane)
+        if first == 0 or not same:
+            gather(vehicles, parameters, faults, draw, hypothesis, tile)
+        face(tile)
+        for step in range(steps + 1):
+            for lane in range(lanes):
+                if due[lane] == step:  # a latency longer than the call is cut to it
+                    b = min(first + lane, rows - 1)
+                    take_commands(vehicles, tile, lane, setpoints[b], driven[b])
+            if step == steps:
+                break
             for v in range(count):
-                drive(k, motors, locked, dt, v, s)
-            n = find_contacts(s, radius, bounds, contacts)
+                drive(vehicles, tile, v)
+            if count > CELLS_ABOVE:
+                found = near_pairs(tile, vehicles.radius_m, vehicles.reach_m, pairs)
+            n = find_contacts(vehicles, tile, pairs, found, contacts, bodies, worlds)
             if n > 0:
-                solve_contacts(s, radius, k, parameters.friction[p], dt, contacts, n)
-                note_contacts(contacts, n, impulses[b], walls[b])
-            for v in range(count):
-                s[v, NORTH] += s[v, V_NORTH] * dt
-                s[v, EAST] += s[v, V_EAST] * dt
-                s[v, YAW] = wrapped(s[v, YAW] + s[v, YAW_RATE] * dt)
-            if n > 0:
-                correct_positions(s, radius, bounds, k, contacts, n)
-        if delay >= steps:  # a latency longer than the call is cut to it
-            take_commands(s, setpoints[b], driven[b])
+                solve_contacts(vehicles, tile, contacts, bodies, n, worlds)
+                note_contacts(contacts, bodies, n, first, impulses, walls)
+            move(tile, vehicles.dt_s)
+            if not vehicles.yaw_locked:
+                face(tile)
+        for lane in range(min(lanes, rows - first)):
+            store(tile, lane, states[first + lane])
 
 
 @compiled
-def take_commands(s: Any, setpoints: Any, driven: Any) -> None:
-    """Put set-points [V, 3] into effect; HOLD (not driven) forgets set-point and integrals."""
-    for v in range(s.shape[0]):
-        if driven[v]:
-            s[v, DRIVEN] = 1.0
-            s[v, SP_NORTH] = setpoints[v, 0]
-            s[v, SP_EAST] = setpoints[v, 1]
-            if not math.isnan(setpoints[v, 2]):
-                s[v, SP_YAW] = setpoints[v, 2]
-        else:
-            s[v, DRIVEN] = 0.0
-            s[v, SP_NORTH] = s[v, SP_EAST] = 0.0
-            s[v, I_X] = s[v, I_Y] = 0.0
+def load(state: Any, tile: Any, lane: int) -> None:
+    for v in range(state.shape[0]):
+        for column in range(STATE_SIZE):
+            tile[v, column, lane] = state[v, column]
+        tile[v, YAW, lane] = (state[v, YAW] + math.pi) % (2.0 * math.pi) - math.pi
 
 
 @compiled
-def drive(k: Any, motors: int, locked: bool, dt: float, v: int, s: Any) -> None:
-    """Velocities of one vehicle after a step of its autopilot, motors and rolling resistance."""
-    north, east, rate = s[v, V_NORTH], s[v, V_EAST], s[v, YAW_RATE]
-    if s[v, DRIVEN] != 0.0:
-        c, sn = math.cos(s[v, YAW]), math.sin(s[v, YAW])
-        ux, uy, uyaw = autopilot(k, motors, locked, dt, v, s, c, sn)
-        vx, vy = c * north + sn * east, c * east - sn * north
-        ax = dot(k, v, GIVE, ux, uy, uyaw) - dot(k, v, DAMP, vx, vy, rate)
-        ay = dot(k, v, GIVE + 3, ux, uy, uyaw) - dot(k, v, DAMP + 3, vx, vy, rate)
-        north += (c * ax - sn * ay) * dt
-        east += (sn * ax + c * ay) * dt
-        rate += (dot(k, v, GIVE + 6, ux, uy, uyaw) - dot(k, v, DAMP + 6, vx, vy, rate)) * dt
-    else:
-        s[v, SP_YAW] = s[v, YAW]
-    keep = kept(math.sqrt(north * north + east * east), k[v, LOSS])
-    s[v, V_NORTH], s[v, V_EAST] = north * keep, east * keep
-    s[v, YAW_RATE] = 0.0 if locked else rate * kept(abs(rate), k[v, YAW_LOSS])
+def store(tile: Any, lane: int, state: Any) -> None:
+    for v in range(state.shape[0]):
+        for column in range(STATE_SIZE):
+            state[v, column] = tile[v, column, lane]
+
+
+@inlined
+def move(tile: Any, dt: float) -> None:
+    for v in range(tile.shape[0] - 1):
+        for lane in range(tile.shape[2]):
+            tile[v, NORTH, lane] += tile[v, V_NORTH, lane] * dt
+            tile[v, EAST, lane] += tile[v, V_EAST, lane] * dt
+            tile[v, YAW, lane] = wrapped(tile[v, YAW, lane] + tile[v, YAW_RATE, lane] * dt)
 
 
 @compiled
-def autopilot(
-    k: Any, motors: int, locked: bool, dt: float, v: int, s: Any, c: float, sn: float
-) -> Any:
-    """Body commands x, y, yaw of the velocity loop; a stuck axis reports no velocity.
-
-    Scaled down together when a motor would saturate.
-    """
-    sp_north, sp_east = s[v, SP_NORTH], s[v, SP_EAST]
-    speed = math.sqrt(sp_north * sp_north + sp_east * sp_east)
-    if speed > k[v, SPEED_LIMIT]:
-        sp_north *= k[v, SPEED_LIMIT] / speed
-        sp_east *= k[v, SPEED_LIMIT] / speed
-    error_n = sp_north if k[v, STUCK] != 0.0 else sp_north - s[v, V_NORTH]
-    error_e = sp_east if k[v, STUCK + 1] != 0.0 else sp_east - s[v, V_EAST]
-    gain = INTEGRATOR_GAIN * dt
-    s[v, I_X] = clipped(s[v, I_X] + gain * (c * error_n + sn * error_e), INTEGRATOR_LIMIT)
-    s[v, I_Y] = clipped(s[v, I_Y] + gain * (c * error_e - sn * error_n), INTEGRATOR_LIMIT)
-    ux = feed_forward(k, v, 0, c * sp_north + sn * sp_east) + s[v, I_X]
-    uy = feed_forward(k, v, 1, c * sp_east - sn * sp_north) + s[v, I_Y]
-    uyaw = 0.0
-    if not locked:
-        turn = YAW_GAIN * wrapped(s[v, SP_YAW] - s[v, YAW]) - YAW_RATE_GAIN * s[v, YAW_RATE]
-        uyaw = clipped(turn, YAW_LIMIT)
-    largest = 1.0
-    for m in range(motors):
-        largest = max(largest, abs(dot(k, v, MIX + 3 * m, ux, uy, uyaw)))
-    return ux / largest, uy / largest, uyaw / largest
-
-
-@compiled
-def feed_forward(k: Any, v: int, axis: int, setpoint_mps: float) -> float:
-    """Output that should hold the set-point: the motors' speed line plus rolling resistance."""
-    u: float = setpoint_mps * k[v, PER_SPEED + axis]
-    if abs(setpoint_mps) >= STANDSTILL_MPS:
-        u += math.copysign(k[v, ROLLING + axis], setpoint_mps)
-    return u
-
-
-@compiled
-def dot(k: Any, v: int, column: int, x: float, y: float, z: float) -> float:
-    result: float = k[v, column] * x + k[v, column + 1] * y + k[v, column + 2] * z
-    return result
-
-
-@compiled
-def kept(speed: float, loss: float) -> float:
-    """The factor that Coulomb resistance leaves of a speed; it never reverses it."""
-    return (speed - loss) / speed if speed > loss else 0.0
-
-
-@compiled
-def note_contacts(contacts: Any, n: int, impulses: Any, walls: Any) -> None:
-    """Add normal impulses (N s) to [V, V] if it is wanted (not empty), and mark walls [V]."""
+def note_contacts(
+    contacts: Any, bodies: Any, n: int, first: int, impulses: Any, walls: Any
+) -> None:
+    """Add normal impulses (N s) to [B, V, V] if it is wanted (not empty), and mark walls [B, V]."""
+    rows, count = walls.shape
     for k in range(n):
-        if contacts[k, 5] > 0.0:
-            i, j = int(contacts[k, 0]), int(contacts[k, 1])
-            if j < 0:
-                walls[i] = True
-            elif impulses.shape[0] > 0:
-                impulses[i, j] += contacts[k, 5]
-                impulses[j, i] += contacts[k, 5]
+        i, j = bodies[k, 0], bodies[k, 1]
+        for lane in range(min(contacts.shape[2], rows - first)):
+            impulse = contacts[k, IMPULSE, lane]
+            if impulse > 0.0:
+                if j == count:
+                    walls[first + lane, i] = True
+                elif impulses.shape[1] > 0:
+                    impulses[first + lane, i, j] += impulse
+                    impulses[first + lane, j, i] += impulse
 
 
-@compiled
-def clipped(value: float, limit: float) -> float:
-    return max(-limit, min(limit, value))
-
-
-@compiled
-def wrapped(angle_rad: float) -> float:
-    """The same angle in [-pi, pi)."""
-    if -math.pi <= angle_rad < math.pi:
-        return angle_rad
-    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
-
-
-def _entry(version: int) -> Any:
+def _entry(version: int, lanes: int) -> Any:
     def advance_rows(
         vehicles: Any,
         parameters: Any,
@@ -215,10 +134,25 @@ def _entry(version: int) -> Any:
     ) -> None:
         if version != 0:  # read, so that the cache knows it
             advance_all(
-                vehicles, parameters, faults, states, setpoints, driven, steps, impulses, walls
+                vehicles,
+                parameters,
+                faults,
+                states,
+                setpoints,
+                driven,
+                steps,
+                impulses,
+                walls,
+                lanes,
             )
 
     return cached(advance_rows)
 
 
-advance_rows = _entry(sources())
+_side_by_side, _alone = _entry(sources(), LANES), _entry(sources(), 1)
+
+
+def advance_rows(vehicles: Any, *rest: Any) -> None:
+    """As `advance_all`, with as many lanes as suit the size of the fleet."""
+    kernel = _side_by_side if len(vehicles.radius_m) <= CELLS_ABOVE else _alone
+    kernel(vehicles, *rest)

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from base_station.hypotheses import Hypothesis
-from hil.airframe import Airframe
+from hil.airframe import Airframe, Motor
 from hil.faults import NED_AXES, Type, Unit
 from hil.scenario import Rectangle, StationView
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 CONTACT_FRICTION = 0.1  # nominal, between two vehicles and between vehicle and wall
 
@@ -25,10 +26,15 @@ class Vehicles(NamedTuple):
     speed_limit_mps: Array  # [V]
     direction: Array  # [V, M, 2] body axes; zero where a vehicle has fewer motors
     arm_m: Array  # [V, M]
-    free_speed_mps: Array  # [V, M]
+    mix: Array  # [V, M, 3] motor outputs per command of body x, y, yaw
     axis_free_speed_mps: Array  # [V, 2] feed-forward of the velocity loop: output per m/s ...
     axis_rolling: Array  # [V, 2] ... and the output that overcomes rolling resistance
+    skid: Flags  # [V] steers by turning
+    turn_line: Array  # [V] feed-forward of a skid-steered turn: output per rad/s ...
+    turn_scrub: Array  # [V] ... and the output that overcomes scrub
     bounds_m: Array  # [4] north min, north max, east min, east max
+    obstacles_m: Array  # [O, 5] strokes with a round brush: from and to (north, east), radius
+    reach_m: float  # gaps that can close within a step
     yaw_locked: bool
     dt_s: float
 
@@ -37,9 +43,11 @@ class Parameters(NamedTuple):
     """What the station knows only roughly. One of P draws serves B / P consecutive batch rows."""
 
     stall_force_n: Array  # [P, V, M]
+    free_speed_mps: Array  # [P, V, M] of a wheel; with force and mass it is the time constant
     mass_kg: Array  # [P, V]
     inertia_kgm2: Array  # [P, V]
     rolling_force_n: Array  # [P, V]
+    side_force_n: Array  # [P, V] that wheels which can't roll sideways withstand
     yaw_resistance_nm: Array  # [P, V]
     friction: Array  # [P]
     latency_s: Array  # [P] from sending a set-point to its effect
@@ -78,30 +86,38 @@ class FleetModel:
     def from_view(cls, view: StationView) -> Self:
         frames = [member.frame for member in view.fleet]
         motors = max(len(f.motors) for f in frames)
+        fastest_mps = max(m.free_speed_mps for f in frames for m in f.motors)
         vehicles = Vehicles(
             radius_m=np.array([f.radius_m for f in frames]),
             speed_limit_mps=np.array([f.speed_limit_mps for f in frames]),
             direction=np.array([_padded([m.direction for m in f.motors], motors) for f in frames]),
             arm_m=np.array([_padded([m.arm_m for m in f.motors], motors) for f in frames]),
-            free_speed_mps=np.array(
-                [_padded([m.free_speed_mps for m in f.motors], motors, 1.0) for f in frames]
-            ),
+            mix=np.array([_padded([_mixed(m) for m in f.motors], motors) for f in frames]),
             axis_free_speed_mps=np.array(
                 [[_axis_free_speed(f, axis) for axis in ("x", "y")] for f in frames]
             ),
             axis_rolling=np.array(
                 [[_axis_rolling(f, axis) for axis in ("x", "y")] for f in frames]
             ),
+            skid=np.array([f.steering == "skid" for f in frames]),
+            turn_line=np.array([_turn(f)[0] for f in frames]),
+            turn_scrub=np.array([_turn(f)[1] for f in frames]),
             bounds_m=_bounds_m(view.arena),
+            obstacles_m=np.empty((0, 5)),
+            reach_m=2.0 * fastest_mps / view.clock.autopilot_hz,
             yaw_locked=view.yaw == "locked",
             dt_s=1.0 / view.clock.autopilot_hz,
         )
         stall = [_padded([m.stall_force_n for m in f.motors], motors) for f in frames]
         nominal = Parameters(
             stall_force_n=np.array([stall]),
+            free_speed_mps=np.array(
+                [[_padded([m.free_speed_mps for m in f.motors], motors, 1.0) for f in frames]]
+            ),
             mass_kg=np.array([[f.mass_kg for f in frames]]),
             inertia_kgm2=np.array([[f.yaw_inertia_kgm2 for f in frames]]),
             rolling_force_n=np.array([[f.rolling_force_n for f in frames]]),
+            side_force_n=np.array([[f.side_grip_n for f in frames]]),
             yaw_resistance_nm=np.array([[f.yaw_resistance_nm for f in frames]]),
             friction=np.array([CONTACT_FRICTION]),
             latency_s=np.zeros(1),
@@ -138,7 +154,9 @@ def perturbed(
         stall_force_n=nominal.stall_force_n * gain,
         mass_kg=nominal.mass_kg * mass,
         inertia_kgm2=nominal.inertia_kgm2 * mass,
+        free_speed_mps=np.repeat(nominal.free_speed_mps, n, axis=0),
         rolling_force_n=nominal.rolling_force_n * rolling,
+        side_force_n=nominal.side_force_n * mass,
         yaw_resistance_nm=nominal.yaw_resistance_nm * rolling,
         friction=rng.uniform(0.0, declared.friction_max, n),
         latency_s=rng.uniform(0.0, declared.latency_max_s, n),
@@ -181,6 +199,20 @@ def _padded(rows: Sequence[object], length: int, fill: float = 0.0) -> Array:
 def _axis_free_speed(frame: Airframe, axis: str) -> float:
     speeds = [frame.motors[i - 1].free_speed_mps for i in frame.axis_motors(axis)]
     return sum(speeds) / len(speeds) if speeds else math.inf
+
+
+def _mixed(motor: Motor) -> tuple[float, float, float]:
+    """As `hil.airframe.mix` shares out body commands."""
+    return (*motor.direction, math.copysign(1.0, motor.arm_m))
+
+
+def _turn(frame: Airframe) -> tuple[float, float]:
+    """Output per rad/s and against scrub, as a skid-steered vehicle's autopilot has them."""
+    if frame.steering != "skid":
+        return 0.0, 0.0
+    motor = frame.motors[0]
+    stall_nm = sum(m.stall_force_n * abs(m.arm_m) for m in frame.motors)
+    return abs(motor.arm_m) / motor.free_speed_mps, frame.yaw_resistance_nm / stall_nm
 
 
 def _axis_rolling(frame: Airframe, axis: str) -> float:

@@ -12,6 +12,7 @@ from base_station.hypotheses import NONE, Hypothesis
 from base_station.twin import (
     EAST,
     NORTH,
+    STATE_SIZE,
     V_EAST,
     V_NORTH,
     YAW_RATE,
@@ -21,7 +22,7 @@ from base_station.twin import (
     initial_state,
     perturbed,
 )
-from base_station.twin.contact import find_contacts
+from base_station.twin.search import near_pairs
 from hil.airframe import OMNI_PLUS
 from hil.scenario import FleetMember, load_scenario, station_view
 
@@ -156,12 +157,11 @@ def test_overlapping_rovers_come_apart():
 
 def test_the_search_by_cells_finds_the_pairs_that_looking_at_all_finds():
     count = 60
-    model = fleet(count)
     rng = np.random.default_rng(0)
     s = initial_state(rng.uniform(-4.0, 4.0, (count, 2)), np.zeros(count))
-    contacts = np.empty((10 * count + 4 * count, 7))
-    n = find_contacts(s, model.vehicles.radius_m, model.vehicles.bounds_m, contacts)
-    found = [(int(i), int(j)) for i, j in contacts[:n, :2] if j >= 0]
+    tile = np.append(s, np.zeros((1, STATE_SIZE)), axis=0)[:, :, None]
+    pairs = np.empty((10 * count, 2), np.uintp)
+    n = near_pairs(tile, np.full(count, 0.3), 0.1, pairs)
     near = [
         (i, j)
         for i in range(count)
@@ -169,7 +169,7 @@ def test_the_search_by_cells_finds_the_pairs_that_looking_at_all_finds():
         if np.hypot(*(s[i, NORTH : EAST + 1] - s[j, NORTH : EAST + 1])) < 0.7
     ]
     assert len(near) > 20
-    assert sorted(found) == near
+    assert sorted((int(i), int(j)) for i, j in pairs[:n]) == near
 
 
 def test_coarse_steps_agree_with_fine_ones():

@@ -25,7 +25,7 @@ from base_station.twin import (
     perturbed,
     report,
 )
-from base_station.twin.kernel import INTEGRATOR_LIMIT
+from base_station.twin.drive import INTEGRATOR_LIMIT
 from hil.airframe import GRAVITY_MPS2, OMNI_PLUS, mix, motor_forces
 from hil.faults import Fault, Type, Unit
 from hil.scenario import load_scenario, station_view

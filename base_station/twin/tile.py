@@ -1,0 +1,122 @@
+"""The kernel's working memory: a tile of some worlds side by side, one per lane.
+
+A tile is [V + 1, COLUMNS, lanes]: block `v` has the state of vehicle v (columns as in
+`state`), what it needs per step (below), and scratch. The last block is the ground that walls and
+obstacles stand on: it has no inverse mass, and never moves. Lanes are innermost, and loops over
+them have no branches: so each becomes a few vector instructions.
+
+Acceleration (body x, y, yaw) = GIVE @ commands - DAMP @ velocity, each 3 x 3, all motors together.
+"""
+
+import math
+from typing import Any
+
+from base_station.twin.compiled import compiled, inlined
+from base_station.twin.state import STATE_SIZE, YAW
+
+COS = STATE_SIZE  # of the yaw
+SIN = COS + 1
+U_X = COS + 2  # commands of the autopilot: body x, y, yaw
+U_Y = COS + 3
+U_YAW = COS + 4
+LARGEST = COS + 5  # output of a motor that these would take
+HELD_N = COS + 6  # what the ground has taken off the velocity in this step: rolling, m/s ...
+HELD_E = COS + 7
+HELD_SIDE = COS + 8  # ... side grip, m/s along body y ...
+HELD_YAW = COS + 9  # ... and scrub, rad/s
+INVERSE_MASS = COS + 10
+INVERSE_INERTIA = COS + 11  # 0 when the yaw is locked
+LOSS = COS + 12  # speed lost to rolling resistance per step, m/s
+SIDE_LOSS = COS + 13  # the same for side grip
+YAW_LOSS = COS + 14  # and scrub, rad/s
+STUCK = COS + 15  # 2 columns: the GPS axis (north, east) is frozen
+PULL = COS + 17  # of one motor while they are gathered: stall force and ...
+SLOWING = COS + 18  # ... stall force over free speed
+GIVE = COS + 19  # 9 columns
+DAMP = GIVE + 9  # 9 columns
+COLUMNS = DAMP + 9
+
+# of what belongs to a world as a whole: `worlds` [WORLD_COLUMNS, lanes]
+FRICTION = 0  # of contacts
+BUSY = 1  # 1: contacts are still to be settled
+CHANGE = 2  # N s, the largest of an impulse in this round
+WORLD_COLUMNS = 3
+
+S_3, S_5, S_7, S_9, S_11, S_13 = (1.0 / math.factorial(n) for n in (3, 5, 7, 9, 11, 13))
+C_2, C_4, C_6, C_8, C_10, C_12, C_14 = (1.0 / math.factorial(n) for n in range(2, 15, 2))
+
+
+@inlined
+def gather(
+    vehicles: Any, parameters: Any, faults: Any, draw: Any, hypothesis: Any, tile: Any
+) -> None:
+    """Fill the constants of all vehicles: lane l is of a parameter draw and a hypothesis."""
+    lanes, dt = tile.shape[2], vehicles.dt_s
+    for v in range(tile.shape[0] - 1):
+        tile[v, GIVE:COLUMNS] = 0.0
+        for lane in range(lanes):
+            p, h = draw[lane], hypothesis[lane]
+            per_mass = 1.0 / parameters.mass_kg[p, v]
+            per_inertia = 1.0 / parameters.inertia_kgm2[p, v]
+            tile[v, INVERSE_MASS, lane] = per_mass
+            tile[v, INVERSE_INERTIA, lane] = 0.0 if vehicles.yaw_locked else per_inertia
+            tile[v, LOSS, lane] = parameters.rolling_force_n[p, v] * per_mass * dt
+            tile[v, SIDE_LOSS, lane] = parameters.side_force_n[p, v] * per_mass * dt
+            tile[v, YAW_LOSS, lane] = parameters.yaw_resistance_nm[p, v] * per_inertia * dt
+            tile[v, STUCK, lane] = faults.gps_stuck[h, v, 0]
+            tile[v, STUCK + 1, lane] = faults.gps_stuck[h, v, 1]
+        for m in range(vehicles.arm_m.shape[1]):
+            gather_motor(vehicles, parameters, faults, draw, hypothesis, v, m, tile)
+
+
+@inlined
+def gather_motor(
+    vehicles: Any,
+    parameters: Any,
+    faults: Any,
+    draw: Any,
+    hypothesis: Any,
+    v: int,
+    m: int,
+    tile: Any,
+) -> None:
+    """Add one motor, with direction and arm as its row of the Jacobian."""
+    for lane in range(tile.shape[2]):
+        p, h = draw[lane], hypothesis[lane]
+        pull = parameters.stall_force_n[p, v, m] * faults.power[h, v, m]
+        tile[v, PULL, lane] = pull
+        tile[v, SLOWING, lane] = pull / parameters.free_speed_mps[p, v, m]
+    for i in range(3):
+        row = jacobian(vehicles, v, m, i)
+        if row == 0.0:
+            continue
+        of = INVERSE_MASS if i < 2 else INVERSE_INERTIA
+        for j in range(3):
+            give, damp = row * vehicles.mix[v, m, j], row * jacobian(vehicles, v, m, j)
+            for lane in range(tile.shape[2]):
+                share = tile[v, of, lane]
+                tile[v, GIVE + 3 * i + j, lane] += give * tile[v, PULL, lane] * share
+                tile[v, DAMP + 3 * i + j, lane] += damp * tile[v, SLOWING, lane] * share
+
+
+@compiled
+def jacobian(vehicles: Any, v: int, m: int, i: int) -> float:
+    """Wheel speed per body velocity x, y, yaw; and body force per wheel force."""
+    result: float = vehicles.direction[v, m, i] if i < 2 else vehicles.arm_m[v, m]
+    return result
+
+
+@inlined
+def face(tile: Any) -> None:
+    """COS and SIN of all yaws (within [-pi, pi)), to the last few bits.
+
+    Series at a quarter of the angle, doubled twice: libm's functions take one number at a time.
+    """
+    for v in range(tile.shape[0]):
+        for lane in range(tile.shape[2]):
+            x = 0.25 * tile[v, YAW, lane]
+            q = -x * x
+            s = x * (1.0 + q * (S_3 + q * (S_5 + q * (S_7 + q * (S_9 + q * (S_11 + q * S_13))))))
+            c = 1.0 + q * (C_2 + q * (C_4 + q * (C_6 + q * (C_8 + q * (C_10 + q * (C_12 + q * C_14))))))
+            s, c = 2.0 * s * c, 1.0 - 2.0 * s * s
+            tile[v, COS, lane], tile[v, SIN, lane] = 1.0 - 2.0 * s * s, 2.0 * s * c
