@@ -46,6 +46,9 @@ def find_contacts(
     """Fill `contacts` and `bodies`; returns how many. BUSY becomes 1 in lanes with a contact."""
     ground, obstacles = tile.shape[0] - 1, vehicles.obstacles_m.shape[0]
     radius, reach, per_dt = vehicles.radius_m, vehicles.reach_m, 1.0 / vehicles.dt_s
+    row: Any
+    i: Any
+    axis: Any
     n = 0
     worlds[BUSY] = 0.0
     for k in range(found + (2 + obstacles) * ground):
@@ -55,9 +58,11 @@ def find_contacts(
             near = measure_vehicle(tile, i, j, radius[i] + radius[j], reach, contacts, row)
         else:
             side = (k - found) % (2 + obstacles)
-            i, j = np.uintp((k - found) // (2 + obstacles)), np.uintp(ground)
+            i, j, axis = np.uintp((k - found) // (2 + obstacles)), np.uintp(ground), np.uintp(side)
             if side < 2:
-                near = measure_wall(vehicles.bounds_m, tile, i, np.uintp(side), radius[i], reach, contacts, row)
+                near = measure_wall(
+                    vehicles.bounds_m, tile, i, axis, radius[i], reach, contacts, row
+                )
             else:
                 stroke = vehicles.obstacles_m[side - 2]
                 near = measure_obstacle(stroke, tile, i, radius[i], reach, contacts, row)

@@ -57,7 +57,7 @@ def solve_contacts(
     for _ in range(ITERATIONS):
         worlds[CHANGE] = 0.0
         for row in range(n):
-            k = np.uintp(row)
+            k: Any = np.uintp(row)
             i, j = bodies[k, 0], bodies[k, 1]
             push(tile, i, j, contacts, k, radius[i], radius[j] if j < ground else 0.0, worlds)
             for lane in range(tile.shape[2]):

@@ -117,6 +117,8 @@ def face(tile: Any) -> None:
             x = 0.25 * tile[v, YAW, lane]
             q = -x * x
             s = x * (1.0 + q * (S_3 + q * (S_5 + q * (S_7 + q * (S_9 + q * (S_11 + q * S_13))))))
-            c = 1.0 + q * (C_2 + q * (C_4 + q * (C_6 + q * (C_8 + q * (C_10 + q * (C_12 + q * C_14))))))
+            c = 1.0 + q * (
+                C_2 + q * (C_4 + q * (C_6 + q * (C_8 + q * (C_10 + q * (C_12 + q * C_14)))))
+            )
             s, c = 2.0 * s * c, 1.0 - 2.0 * s * s
             tile[v, COS, lane], tile[v, SIN, lane] = 1.0 - 2.0 * s * s, 2.0 * s * c

@@ -145,6 +145,19 @@ def test_a_wall_stops_a_rover_and_is_noticed():
     assert after.walls[0].tolist() == [True, False]
 
 
+@pytest.mark.parametrize("to_north_m", [0.0, 1.0])
+def test_an_obstacle_stops_a_rover_where_it_stands(to_north_m):
+    """A round one, and one end of a stroke across the way."""
+    model = fleet(1)
+    obstacle = np.array([[0.0, 2.0, to_north_m, 2.0, 0.25]])
+    model = FleetModel(model.sysids, model.vehicles._replace(obstacles_m=obstacle), model.nominal)
+    start = initial_state([[[0.0, 0.0]]], [[0.0]])
+    after = advance(model, model.nominal, healthy(model), start, [[0.0, 1.0, NAN]], [True], 5.0)
+    stop_m = 2.0 - 0.25 - OMNI_PLUS.radius_m
+    assert after.states[0, 0, EAST] == pytest.approx(stop_m, abs=1e-3)
+    assert after.walls[0].tolist() == [True]
+
+
 def test_overlapping_rovers_come_apart():
     model = fleet(2)
     start = initial_state([[[0.0, 0.0], [0.0, 0.4]]], [[0.0, 0.0]])
