@@ -79,6 +79,7 @@ def encode_state(state: PhysicsState) -> bytes:
         "position": state.position_m,
         "velocity": state.velocity_mps,
         "attitude": state.attitude_rad,
+        "no_time_sync": 1,  # the world sets the pace
     }
     return b"\n" + _COMPACT.encode(tree).encode() + b"\n"
 

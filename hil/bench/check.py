@@ -5,6 +5,7 @@ from pathlib import Path
 from base_station.autopilots import adapter
 from base_station.hypotheses import candidates
 from hil.airframe import push_margin
+from hil.bench.firmware import is_foreign, start_of
 from hil.bench.onsets import Onsets
 from hil.bench.record import describe_fault
 from hil.errors import InputError
@@ -41,6 +42,7 @@ def margin(scenario: Scenario, pushed: Vehicle, axis: str) -> float:
 def refuse_hopeless(path: Path, scenario: Scenario) -> None:
     """Raises InputError for an expectation that no run can meet."""
     _refuse_unknown_autopilot(path, scenario)
+    _refuse_unbreakable(path, scenario)
     _refuse_unknown_hypothesis(path, scenario)
     _refuse_weak_rescue(path, scenario)
 
@@ -51,6 +53,22 @@ def _refuse_unknown_autopilot(path: Path, scenario: Scenario) -> None:
             adapter(v.autopilot, v.frame)
         except InputError as error:
             raise InputError(f"{path}: fleet.{i}.{error}") from None
+
+
+def _refuse_unbreakable(path: Path, scenario: Scenario) -> None:
+    """A foreign firmware knows nothing of our injector: the world has to break it."""
+    for i, v in enumerate(scenario.fleet):
+        if is_foreign(v) and start_of(v.autopilot) is None:
+            raise InputError(
+                f"{path}: fleet.{i}.autopilot = {v.autopilot!r} cannot be started here; "
+                "use testbed, or start it by hand with `hil world`"
+            )
+    for i, fault in enumerate(scenario.faults):
+        if is_foreign(scenario.vehicle(fault.vehicle)) and not fault.by_world:
+            raise InputError(
+                f"{path}: faults.{i}: {scenario.vehicle(fault.vehicle).name} is not ours to break "
+                "from inside; add applied_by: world"
+            )
 
 
 def _refuse_unknown_hypothesis(path: Path, scenario: Scenario) -> None:

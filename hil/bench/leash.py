@@ -2,6 +2,7 @@
 
 LEASH_S = 0.5  # ahead of the station's last tick
 FIRST_LEASH_S = 3.0  # before the station has ticked at all
+BOOT_S, BOOT_SPEED = 180.0, 4.0  # a foreign firmware and its EKF take a minute of world time
 
 
 class Leash:
@@ -11,9 +12,11 @@ class Leash:
     the processor more, and nobody waits for the world.
     """
 
-    def __init__(self, speed: float) -> None:
+    def __init__(self, speed: float, boots: bool = False) -> None:
         self.until_s = 0.0
         self._pace = speed or 1.0
+        self._boots, self._boot_pace = boots, speed or BOOT_SPEED
+        self._began_s: float | None = None
         self._learning: tuple[float, float] | None = None  # wall and world time of its beginning
         self._absent: tuple[float, float] | None = None  # the same of its being away
 
@@ -27,7 +30,7 @@ class Leash:
     def lengthen(self, tick_s: float | None, learning: bool, now_s: float) -> bool:
         """Take the station's last tick; whether the leash is longer now."""
         self._absent = None
-        until_s = FIRST_LEASH_S if tick_s is None else tick_s + LEASH_S
+        until_s = self._first_s(now_s) if tick_s is None else tick_s + LEASH_S
         if not learning:
             self._learning = None
         else:
@@ -37,3 +40,11 @@ class Leash:
         longer = until_s > self.until_s
         self.until_s = max(until_s, self.until_s)
         return longer
+
+    def _first_s(self, now_s: float) -> float:
+        """Before the first tick; who boots gets time at a pace that a station can follow."""
+        if not self._boots:
+            return FIRST_LEASH_S
+        if self._began_s is None:
+            self._began_s = now_s
+        return min(BOOT_S, FIRST_LEASH_S + (now_s - self._began_s) * self._boot_pace)

@@ -31,6 +31,7 @@ class Command:
     cwd: Path | None = None
     takes_lines: bool = False
     again: tuple[str, ...] | None = None
+    says_ready: bool = True  # somebody else's program does not
 
 
 def _environment() -> dict[str, str]:
@@ -59,7 +60,7 @@ class Child:
         self._start(self._command.again, "ab")
 
     def _start(self, argv: tuple[str, ...], log_mode: str) -> None:
-        self.ready = False
+        self.ready = not self._command.says_ready
         self._rest = b""
         with self.log.open(log_mode) as log:
             self.process = subprocess.Popen(

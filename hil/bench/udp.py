@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from hil.bench.folders import SCENARIO_FILE, VIEW_FILE, Folders
+from hil.bench.firmware import is_foreign, start_of
 from hil.bench.injector import Breaker
 from hil.bench.leash import Leash
 from hil.bench.lines import STATION, parse_station_line
@@ -82,7 +83,7 @@ class _Run:
             _signing(options.signing_key),
         )
         self._injector_links: dict[int, UdpLink] = {}
-        self._leash = Leash(options.speed)
+        self._leash = Leash(options.speed, boots=any(map(is_foreign, scenario.fleet)))
 
     def go(self) -> None:
         with ExitStack() as stack:
@@ -109,6 +110,10 @@ class _Run:
         key = self._options.signing_key
         signing = () if key is None else ("--signing-key", str(key.absolute()))
         for v in self._scenario.fleet:
+            foreign = start_of(v.autopilot)
+            if foreign is not None:
+                children.start(foreign(self._scenario, v, folder))
+                continue
             argv = (*programs.vehicle, scenario_file, "--sysid", str(v.sysid), *signing)
             children.start(Command(f"sim-vehicle {v.name}", argv, folder / f"{v.name}.log"))
         viewer = ("--viewer", self._options.viewer) if self._options.viewer else ()

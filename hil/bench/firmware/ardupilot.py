@@ -1,0 +1,97 @@
+"""ArduPilot's rover in our world: `ardurover --model JSON:...`, a fresh folder for each.
+
+Environment variable ARDUROVER names the binary. What it is not told by option it reads from a
+file of parameters: skid steering on outputs 1 and 2, no power when disarmed, and gains for the
+airframe (from its motors' torque-speed line, as ArduPilot's tuning guide asks).
+"""
+
+import os
+from pathlib import Path
+
+from hil.airframe import Airframe
+from hil.bench.processes import Command
+from hil.errors import InputError
+from hil.scenario import PORTS_PER_VEHICLE, Scenario, Vehicle
+
+NAME = "ardupilot"
+BINARY = "ARDUROVER"
+AIRFRAMES = ("skid_steer",)
+CRUISE_SHARE = 0.7  # of the speed limit, where throttle is calibrated
+
+
+def binary() -> Path | None:
+    """The rover's simulator, if there is one."""
+    named = os.environ.get(BINARY)
+    return Path(named) if named and os.access(named, os.X_OK) else None
+
+
+def start(scenario: Scenario, vehicle: Vehicle, folder: Path) -> Command:
+    """Raises InputError when there is no binary, or it can't be that airframe."""
+    program = binary()
+    if program is None:
+        raise InputError(
+            f"{vehicle.name}: autopilot {NAME} needs environment variable {BINARY} to name an "
+            "ardurover built for SITL"
+        )
+    if vehicle.airframe not in AIRFRAMES:
+        raise InputError(
+            f"{vehicle.name}: ArduPilot's rover drives heading first; airframe must be one of "
+            f"{', '.join(AIRFRAMES)}, not {vehicle.airframe}"
+        )
+    links, index = scenario.links, scenario.fleet.index(vehicle)
+    assert links.physics_port_base is not None
+    assert links.mavlink_port_base is not None
+    home = folder / vehicle.name
+    home.mkdir()
+    (home / "rover.parm").write_text(parameters(scenario, vehicle), encoding="utf-8")
+    origin = scenario.origin
+    offset = PORTS_PER_VEHICLE * index
+    argv = (
+        str(program.resolve()),
+        *("--model", f"JSON:{links.host}"),
+        *("--sim-port-out", str(links.physics_port_base + offset)),
+        *("--home", f"{origin.lat_deg:.7f},{origin.lon_deg:.7f},{origin.alt_m:g},0"),
+        *("--serial0", f"udpclient:{links.host}:{links.mavlink_port_base + offset}"),
+        *(word for i in range(1, 8) for word in (f"--serial{i}", "none:x")),
+        *("--sysid", str(vehicle.sysid), "--speedup", "1", "--defaults", "rover.parm", "--wipe"),
+    )
+    log = folder / f"{vehicle.name}.log"
+    return Command(f"ardurover {vehicle.name}", argv, log, cwd=home, says_ready=False)
+
+
+def parameters(scenario: Scenario, vehicle: Vehicle) -> str:
+    """The file of defaults, one `NAME value` a line."""
+    frame = vehicle.frame
+    cruise_mps = CRUISE_SHARE * frame.speed_limit_mps
+    values = {
+        "SYSID_THISMAV": vehicle.sysid,
+        "SYSID_MYGCS": scenario.links.station_sysid,
+        "FRAME_CLASS": 1,
+        "SERVO1_FUNCTION": 73,  # throttle left
+        "SERVO2_FUNCTION": 74,  # throttle right
+        "SERVO3_FUNCTION": 0,
+        "MOT_SAFE_DISARM": 1,  # no pulses: wheels run free
+        "SIM_RATE_HZ": scenario.clock.physics_hz,
+        "SIM_SPEEDUP": 1,
+        "INITIAL_MODE": 4,  # HOLD
+        "LOG_BACKEND_TYPE": 0,
+        "ARMING_RUDDER": 0,
+        "CRUISE_SPEED": cruise_mps,
+        "CRUISE_THROTTLE": round(100 * _throttle_for(frame, cruise_mps)),
+        "WP_SPEED": frame.speed_limit_mps,
+        "ATC_STR_RAT_FF": 0.25,
+        "ATC_STR_RAT_P": 0.2,
+        "ATC_STR_RAT_I": 0.2,
+        "ATC_STR_ANG_P": 2.0,
+        "ATC_STR_RAT_MAX": 120,
+        "ATC_SPEED_P": 0.3,
+        "ATC_SPEED_I": 0.3,
+        "ATC_ACCEL_MAX": 2.0,
+    }
+    return "".join(f"{name} {value:g}\n" for name, value in values.items())
+
+
+def _throttle_for(frame: Airframe, speed_mps: float) -> float:
+    """Output that holds a speed: the motors' speed line, and rolling resistance."""
+    free_mps = sum(m.free_speed_mps for m in frame.motors) / len(frame.motors)
+    return speed_mps / free_mps + frame.rolling_force_n / frame.axis_stall_force_n("x")
