@@ -52,6 +52,10 @@ class Fleet:
         elif isinstance(value, mavlink.Timesync) and value.tc1_ns:
             self._clock.reply(member.sysid, value.tc1_ns, value.ts1_ns, int(wall_s * 1e9))
 
+    def fleet_time_s(self, index: int, boot_s: float) -> float:
+        """A vehicle's own time as fleet time."""
+        return self._clock.fleet_time_s(self.view.fleet[index].sysid, boot_s)
+
     def mode_acknowledged(self, index: int, mode: int) -> None:
         """The vehicle said that it is in `mode` now, before its next heartbeat does."""
         track = self.tracks[index]

@@ -54,8 +54,9 @@ class StationNode:
         listeners: Sequence[Listener],
         journal: Keeper | None = None,
         key: bytes | None = None,
+        station: Station | None = None,
     ) -> None:
-        self.station = Station(view)
+        self.station = station or Station(view)
         self._sysids = [m.sysid for m in view.fleet]
         self._links, self._planner, self._journal = links, planner, journal
         self._listeners = Listeners(listeners)

@@ -21,10 +21,16 @@ class Preparation:
     """What one vehicle has been asked for, and what it has done of that."""
 
     def __init__(
-        self, member: FleetMember, autopilot: Autopilot, telemetry_hz: float, station_sysid: int
+        self,
+        member: FleetMember,
+        autopilot: Autopilot,
+        telemetry_hz: float,
+        station_sysid: int,
+        wants: tuple[Rate, ...] = (),
     ) -> None:
         self._member, self._autopilot = member, autopilot
-        self._rates = autopilot.rates(telemetry_hz)
+        wanted = {r.message: r for r in (*autopilot.rates(telemetry_hz), *wants)}
+        self._rates = tuple(wanted.values())
         self._settings = dict.fromkeys(autopilot.settings(station_sysid))
         self._read: dict[Setting, float | None] = dict(self._settings)
         self._located = not autopilot.has_own_origin

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from base_station import doubt as doubts
+from base_station.autopilots import Rate
 from base_station.commander import Commander
 from base_station.commands import AskTime, Command, Drive, Heartbeat
 from base_station.desk import Desk
@@ -62,18 +63,22 @@ class Station:
     """Drives one fleet through the paper's steps [0a]-[4]. `step` never blocks.
 
     `decide` gives the orders of a tick and moves the phases on; `ready` makes the first tick
-    possible.
+    possible; `wants` are rates beyond the usual.
     """
 
     def __init__(
-        self, view: StationView, decide: Decide | None = None, ready: GetReady | None = None
+        self,
+        view: StationView,
+        decide: Decide | None = None,
+        ready: GetReady | None = None,
+        wants: tuple[Rate, ...] = (),
     ) -> None:
         self.desk = Desk(view)
         self._decide, self._get_ready = decide or own_decision, ready or self._arm_prepared
         self._commander = Commander(view)
         self.autopilots = self._commander.autopilots
         self._preparations = [
-            Preparation(m, a, view.clock.telemetry_hz, view.station_sysid)
+            Preparation(m, a, view.clock.telemetry_hz, view.station_sysid, wants)
             for m, a in zip(view.fleet, self.autopilots, strict=True)
         ]
         self._touched_s: dict[tuple[int, int], float] = {}

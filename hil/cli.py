@@ -127,6 +127,13 @@ def _check(options: argparse.Namespace) -> int:
     return 0
 
 
+def _identify(options: argparse.Namespace) -> int:
+    from base_station.identify.process import identify
+
+    print(identify(options.fleet, options.out))
+    return 0
+
+
 def _station_view(options: argparse.Namespace) -> int:
     from hil.bench.folders import blind_view
 
@@ -265,6 +272,15 @@ def _parser() -> argparse.ArgumentParser:
 
     check = commands.add_parser("check", parents=[scenario], help="validate a scenario")
     check.set_defaults(command=_check)
+
+    identify = commands.add_parser(
+        "identify", help="drive each vehicle of a fleet gently, and fit its twin to its answers"
+    )
+    identify.add_argument("fleet", type=Path, metavar="FLEET", help="a fleet file")
+    identify.add_argument(
+        "-o", "--out", type=Path, metavar="FILE", help="default FLEET.identified.yaml"
+    )
+    identify.set_defaults(command=_identify)
 
     told = commands.add_parser(
         "station-view", parents=[scenario], help="print what the base station is told"

@@ -31,6 +31,8 @@ class Autopilot(ABC):
     NAME: ClassVar[str]
     has_own_origin: ClassVar[bool] = True  # local NED begins somewhere of the vehicle's own
     needs_setpoints_first: ClassVar[bool] = False  # the driven mode is refused without a stream
+    response: ClassVar[str] = "first_order"  # how speed follows a set-point, for `hil identify`
+    estimate_lags: ClassVar[bool] = False  # no accelerometer in it: raw fixes are truer
     setpoint_timeout_s: ClassVar[float] = 3.0  # it stops by itself after the last set-point
 
     def __init__(self, frame: Airframe) -> None:

@@ -15,6 +15,8 @@ class Testbed(Autopilot):
 
     NAME: ClassVar[str] = "testbed"
     has_own_origin: ClassVar[bool] = False
+    response: ClassVar[str] = "integrating"
+    estimate_lags: ClassVar[bool] = True
 
     @property
     def driven_mode(self) -> int:

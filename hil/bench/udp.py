@@ -7,8 +7,8 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from hil.bench.folders import SCENARIO_FILE, VIEW_FILE, Folders
 from hil.bench.firmware import is_foreign, start_of
+from hil.bench.folders import SCENARIO_FILE, VIEW_FILE, Folders
 from hil.bench.injector import Breaker
 from hil.bench.leash import Leash
 from hil.bench.lines import STATION, parse_station_line

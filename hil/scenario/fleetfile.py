@@ -1,6 +1,5 @@
 """Fleet files: real vehicles, or simulators started by hand, for `base-station FLEET`."""
 
-from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -63,8 +62,3 @@ class FleetFile(Model):
 def is_fleet_file(tree: dict[str, Any]) -> bool:
     """Whether a map is meant as a fleet file; a station view carries ports and a host."""
     return "host" not in tree and "name" not in tree
-
-
-def fleet_path(path: Path) -> Path:
-    """Where the fit of `hil identify` to a fleet file lies: beside it."""
-    return path.with_suffix(".identified.yaml")
