@@ -1,6 +1,6 @@
 """What a vehicle is told so that its answer shows what it is: steps there and back on each axis.
 
-One vehicle after another, all others in HOLD. An axis is over within 80 s and 0.6 m.
+One vehicle after another, all others in HOLD. An axis is over within 80 s; at 1 m/s it takes 1 m.
 """
 
 import math
@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 REST_S = 2.0
 STEPS = ((1.0, 1.2), (-1.0, 1.2), (0.6, 0.8), (-0.6, 0.8))  # share of the speed, duration (s)
 ROUNDS = 18
+SPEED_SHARE = 0.8  # of limits.speed_mps
 STANDING_S = 30.0  # everybody, at first: the noise of the receivers
 
 
@@ -73,8 +74,7 @@ class Excitation:
 
     def __init__(self, view: StationView) -> None:
         self._view = view
-        speed_mps = min(view.limits.probe_speed_mps, view.limits.speed_mps)
-        self._schedule = schedule(speed_mps)
+        self._schedule = schedule(SPEED_SHARE * view.limits.speed_mps)
         self._axis_s = sum(duration for _, duration in self._schedule)
         self._turns = [(i, axis) for i, m in enumerate(view.fleet) for axis in _axes(m)]
         self._since_s: float | None = None

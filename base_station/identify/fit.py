@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 
 VELOCITY_SIGMA_MPS, POSITION_SIGMA_M = 0.05, 0.02  # weights of the two kinds of report
 LATENCIES_S = np.arange(0.0, 1.21, 0.05)  # where the search may start: latency has local minima
+STARTS = 3
 SLOW_S = 5.0  # a position error slower than this is the receiver's wander
 
 
@@ -47,14 +48,18 @@ def fit_axis(tried: Tried, response: Response) -> AxisFit:
         return np.stack(columns, axis=1)
 
     starts = [np.append(response.start[:-1], latency_s) for latency_s in LATENCIES_S]
-    start = min(starts, key=lambda p: float(np.sum(weighted(p) ** 2)))
-    best = least_squares(
-        weighted,
-        np.clip(start, response.low + 1e-6, response.high - 1e-6),
-        jac=slopes,
-        bounds=(response.low, response.high),
-        x_scale=steps,
-    )
+    starts.sort(key=lambda p: float(np.sum(weighted(p) ** 2)))
+    found = [
+        least_squares(
+            weighted,
+            np.clip(start, response.low + 1e-6, response.high - 1e-6),
+            jac=slopes,
+            bounds=(response.low, response.high),
+            x_scale=response.steps,
+        )
+        for start in starts[:STARTS]
+    ]
+    best = min(found, key=lambda f: float(f.cost))
     velocity, position = errors(best.x)
     nominal = response.start.copy()
     nominal[-1] = 0.0

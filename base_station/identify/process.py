@@ -35,7 +35,7 @@ def identify(path: Path, out: Path | None) -> Path:
     """
     view = load_station_view(path)
     identification = Identification(view)
-    print(f"{len(view.fleet)} vehicles, {identification.duration_s:.0f} s, 0.6 m each way")
+    print(f"{len(view.fleet)} vehicles, {identification.duration_s:.0f} s of driving to and fro")
     ask_before_arming(view)
     with ExitStack() as stack:
         links = open_links(stack, view)

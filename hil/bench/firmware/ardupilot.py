@@ -16,6 +16,7 @@ from hil.scenario import PORTS_PER_VEHICLE, Scenario, Vehicle
 NAME = "ardupilot"
 BINARY = "ARDUROVER"
 AIRFRAMES = ("skid_steer",)
+OTHER_LINES = (1, 2, 5, 6, 7)  # 3 and 4 are its GPS receivers
 CRUISE_SHARE = 0.7  # of the speed limit, where throttle is calibrated
 
 
@@ -52,7 +53,7 @@ def start(scenario: Scenario, vehicle: Vehicle, folder: Path) -> Command:
         *("--sim-port-out", str(links.physics_port_base + offset)),
         *("--home", f"{origin.lat_deg:.7f},{origin.lon_deg:.7f},{origin.alt_m:g},0"),
         *("--serial0", f"udpclient:{links.host}:{links.mavlink_port_base + offset}"),
-        *(word for i in range(1, 8) for word in (f"--serial{i}", "none:x")),
+        *(word for i in OTHER_LINES for word in (f"--serial{i}", "none:x")),
         *("--sysid", str(vehicle.sysid), "--speedup", "1", "--defaults", "rover.parm", "--wipe"),
     )
     log = folder / f"{vehicle.name}.log"
