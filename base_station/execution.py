@@ -50,6 +50,13 @@ def probe_pulses(vehicles: int) -> tuple[Pulse, ...]:
     return tuple(Pulse(v, a, s) for v in range(vehicles) for a in (0, 1) for s in (1, -1))
 
 
+def pulses_of(view: StationView) -> tuple[Pulse, ...]:
+    """Those that a fleet can answer: who steers by turning goes forward and no other way."""
+    pulses = probe_pulses(len(view.fleet))
+    turns = [member.frame.steering == "skid" for member in view.fleet]
+    return tuple(p for p in pulses if not turns[p.vehicle] or (p.axis, p.sign) == (0, 1))
+
+
 def pulse_at(
     pulses: Sequence[Pulse], elapsed_s: float, view: StationView
 ) -> tuple[Pulse | None, bool]:

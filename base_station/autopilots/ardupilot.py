@@ -4,7 +4,8 @@ from typing import ClassVar
 
 from base_station.autopilots.adapter import Autopilot, Rate, Setting
 from base_station.telemetry import Status
-from hil.mavlink import CopterMode, EkfFlag, MessageId, RoverMode
+from hil.frames import ned_to_body
+from hil.mavlink import CopterMode, EkfFlag, Encoder, MessageId, RoverMode
 
 _LOCATED = EkfFlag.ATTITUDE | EkfFlag.VELOCITY_HORIZ | EkfFlag.POS_HORIZ_ABS
 
@@ -35,6 +36,24 @@ class ArduPilot(Autopilot):
         flags = EkfFlag(status.ekf_flags & 0xFFFF)
         located = flags & _LOCATED == _LOCATED and not flags & EkfFlag.CONST_POS_MODE
         return status.prearm_ok and located
+
+    def velocity(
+        self,
+        encoder: Encoder,
+        sysid: int,
+        time_s: float,
+        north_mps: float,
+        east_mps: float,
+        yaw_rad: float | None,
+    ) -> bytes:
+        """With a yaw, Rover drives along that heading, backwards where the first component is < 0.
+
+        It takes the sign from there in whatever frame, so the speed along the heading goes there.
+        """
+        if yaw_rad is not None and self.heading_first:
+            ahead, _ = ned_to_body(north_mps, east_mps, yaw_rad)
+            north_mps, east_mps = ahead, 0.0
+        return super().velocity(encoder, sysid, time_s, north_mps, east_mps, yaw_rad)
 
     def rates(self, telemetry_hz: float) -> tuple[Rate, ...]:
         return (*super().rates(telemetry_hz), Rate(MessageId.EKF_STATUS_REPORT, 2.0))

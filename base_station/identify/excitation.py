@@ -77,6 +77,7 @@ class Excitation:
         self._schedule = schedule(SPEED_SHARE * view.limits.speed_mps)
         self._axis_s = sum(duration for _, duration in self._schedule)
         self._turns = [(i, axis) for i, m in enumerate(view.fleet) for axis in _axes(m)]
+        self._heading_first = [adapter(m.autopilot, m.frame).heading_first for m in view.fleet]
         self._since_s: float | None = None
         self._rows: dict[tuple[int, int], _Rows] = {}
 
@@ -107,6 +108,8 @@ class Excitation:
         if setpoint_mps == setpoint_mps:
             body = (setpoint_mps, 0.0) if axis == 0 else (0.0, setpoint_mps)
             orders.setpoints[index, :2] = body_to_ned(*body, rows.yaw_rad)
+            if self._heading_first[index]:
+                orders.setpoints[index, 2] = rows.yaw_rad  # backwards without turning round
             orders.driven[index] = True
         return orders
 

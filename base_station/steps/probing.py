@@ -39,7 +39,7 @@ def fresh_watch(desk: Desk) -> Watch:
 
 def probe(desk: Desk, phase: Probing, frame: Frame) -> Orders:
     """Pulse after pulse; then doubt whoever did not answer, or go on to the mission."""
-    pulses = execution.probe_pulses(len(desk.view.fleet))
+    pulses = execution.pulses_of(desk.view)
     pulse, driven = execution.pulse_at(pulses, frame.time_s - phase.since_s, desk.view)
     if pulse is None:
         if desk.alarmed:

@@ -28,7 +28,7 @@ from hil.scenario.places import Arena, Clock, Geofence, OriginModel, Point
 from hil.scenario.schema import Scenario
 from hil.scenario.vehicles import Sensors
 
-STATION_AIRFRAMES = ("omni_plus",)  # those that the station's twin can be
+STATION_AIRFRAMES = ("omni_plus", "skid_steer")  # those that the station's twin can be
 
 
 def _twinned_airframe(name: str) -> str:
