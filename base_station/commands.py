@@ -8,7 +8,10 @@ from hil.mavlink import Encoder, MessageId
 
 @dataclass(frozen=True)
 class Arm:
+    """MAV_CMD_COMPONENT_ARM_DISARM; disarming is the emergency stop, and forced."""
+
     sysid: int
+    armed: bool = True
 
 
 @dataclass(frozen=True)
@@ -75,8 +78,8 @@ Command = AskRate | RequestMessage | SetParameter | Arm | SetMode | Drive | Hear
 def encode(command: Command, encoder: Encoder, autopilot: Autopilot) -> bytes:
     """The one datagram that says `command` to a vehicle with that autopilot."""
     match command:
-        case Arm(sysid):
-            return encoder.arm(sysid)
+        case Arm(sysid, armed):
+            return encoder.arm(sysid) if armed else encoder.emergency_stop(sysid)
         case SetMode(sysid, mode):
             return autopilot.set_mode(encoder, sysid, mode)
         case Drive(sysid, time_s, north_mps, east_mps, yaw_rad):

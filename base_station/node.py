@@ -8,18 +8,20 @@ journal before the step; `replay` takes them from there, tells nobody, and belie
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
-from base_station.commands import encode
+from base_station.commands import Command, encode
 from base_station.journal import Datagrams, Inputs
 from base_station.listening import Listener, Listeners
 from base_station.outcome import PhaseTimes, outcome, training
 from base_station.planning.requests import PlanProgress, PlanReady, PlanRequest
 from base_station.records import Event
 from base_station.refusals import Refusals
+from base_station.safety import disarm_all, stop_all
 from base_station.station import Outputs, Station
 from hil.link import Link
 from hil.mavlink import COMPONENT_GCS, Decoder, Encoder, Received, Signing, ticks
 from hil.scenario import StationView
 
+REPEATS = 3  # of what is said only once
 LINGER_S = 1.0  # after the end, until every vehicle has confirmed HOLD
 
 Heard = list[tuple[int, Received]]
@@ -108,6 +110,24 @@ class StationNode:
         self._listeners = Listeners(listeners)
         if self._waiting is not None:
             planner.submit(self._waiting)
+
+    def hold_all(self) -> None:
+        """Everybody stands, whatever the station had in mind: it is about to go."""
+        view = self.station.desk.view
+        self._say_at_once(stop_all(view, self.station.autopilots))
+
+    def emergency_stop(self) -> None:
+        """Motors off."""
+        self._say_at_once(disarm_all(self.station.desk.view))
+
+    def _say_at_once(self, commands: Sequence[Command]) -> None:
+        """Three times: the station will not see whether it was heard."""
+        for command in (*commands,) * REPEATS:
+            index = self._sysids.index(command.sysid)
+            autopilot = self.station.autopilots[index]
+            datagram = encode(command, self._encoders[index], autopilot)
+            self._links[index].send(datagram)
+            self._log(index, datagram)
 
     def is_welcome(self, index: int, datagram: bytes) -> bool:
         """Whether what comes from a new address may come from that vehicle."""

@@ -17,8 +17,12 @@ from typing import Any
 import numpy as np
 
 from base_station import twin
+from base_station.budget import refuse_overload
+from base_station.consent import ask_before_arming
+from base_station.dry import DryEnd
 from base_station.execution import hold
 from base_station.journal import Head, Journal, journal_files
+from base_station.keys import emergency_key
 from base_station.listeners import open_listeners
 from base_station.node import StationNode
 from base_station.planner_child import PlannerChild
@@ -37,12 +41,17 @@ STEP_S = 0.05  # 20 Hz when nothing arrives
 
 
 class StopRequested(Exception):  # noqa: N818 - not an error
-    """SIGTERM or SIGINT: stop tidily."""
+    """SIGTERM, SIGINT or SIGHUP (the terminal is gone): hold the fleet, stop tidily."""
+
+
+class EmergencyStop(StopRequested):
+    """SIGUSR1, or the space bar: motors off."""
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    for number in (signal.SIGTERM, signal.SIGINT):
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         signal.signal(number, _terminate)
+    signal.signal(signal.SIGUSR1, _emergency)
     try:
         run(_arguments(argv))
     except StopRequested:
@@ -74,6 +83,9 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--signing-key", type=Path, metavar="FILE", help="sign MAVLink with the pass phrase in it"
     )
+    parser.add_argument(
+        "--dry-run", action="store_true", help="send nothing; show what would be sent"
+    )
     parser.add_argument("--machine", action="store_true", help="JSON lines instead of text")
     parser.add_argument(
         "--viewer",
@@ -93,6 +105,10 @@ def _terminate(_signal: int, _frame: FrameType | None) -> None:
     raise StopRequested
 
 
+def _emergency(_signal: int, _frame: FrameType | None) -> None:
+    raise EmergencyStop
+
+
 def run(arguments: argparse.Namespace) -> None:
     """Raises InputError for bad input or a busy port, ProcessDiedError when the planner dies."""
     key = None if arguments.signing_key is None else read_key(arguments.signing_key)
@@ -101,8 +117,16 @@ def run(arguments: argparse.Namespace) -> None:
     out = arguments.out if resumed is None else arguments.resume
     say = _say_json if arguments.machine else _say_text
     run_id = arguments.run_id or f"station-{os.getpid()}"
+    refuse_overload(view)
     with ExitStack() as stack:
         links = open_links(stack, view)
+        if resumed is None and not arguments.dry_run:
+            ask_before_arming(view)
+        if arguments.dry_run:
+            links = [
+                DryEnd(link, m.name, lambda text: print(text, flush=True))
+                for link, m in zip(links, view.fleet, strict=True)
+            ]
         for connection in dict.fromkeys(map(view.connection_of, view.fleet)):
             if connection.kind == "udpin" and not connection.is_on_this_machine:
                 print(f"listens to other machines, too: {connection}", file=sys.stderr, flush=True)
@@ -126,9 +150,20 @@ def run(arguments: argparse.Namespace) -> None:
         for index, link in enumerate(links):
             link.guard(partial(node.is_welcome, index), partial(node.hear_of, index))
         say({"type": "ready", "planner_pid": planner.pid})
-        while not node.finished:
-            select.select([*(link.fileno() for link in links), planner.fileno()], [], [], STEP_S)
-            node.step(time.monotonic() + offset_s, time.time_ns() // 1000)
+        keys = stack.enter_context(emergency_key(sys.stdin))
+        try:
+            while not node.finished:
+                sources = [*(link.fileno() for link in links), planner.fileno(), *keys.filenos()]
+                ready, _, _ = select.select(sources, [], [], STEP_S)
+                if keys.pressed(ready):
+                    raise EmergencyStop
+                node.step(time.monotonic() + offset_s, time.time_ns() // 1000)
+        except EmergencyStop:
+            node.emergency_stop()
+            raise
+        except StopRequested:
+            node.hold_all()
+            raise
 
 
 def _open_journal(out: Path, head: Head) -> Journal:

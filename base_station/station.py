@@ -31,6 +31,7 @@ from base_station.phases import (
 from base_station.planning.requests import PlanReady, PlanRequest
 from base_station.preparing import Preparation
 from base_station.records import Event, Snapshot
+from base_station.safety import Held, permitted
 from base_station.snapshots import snapshot
 from base_station.steps.diagnosing import await_alpha, conclude, experiment, settle
 from base_station.steps.probing import get_ready, probe
@@ -82,6 +83,7 @@ class Station:
             for m, a in zip(view.fleet, self.autopilots, strict=True)
         ]
         self._touched_s: dict[tuple[int, int], float] = {}
+        self._held: frozenset[Held] = frozenset()
         self._beats_s = (float("-inf"), float("-inf"))  # last heartbeat: wall, fleet
         self._asked_time_s = float("-inf")
         self._stepped_wall_s: float | None = None
@@ -123,13 +125,22 @@ class Station:
         for frame in frames:
             commands += self._tick(frame)
             snapshots.append(snapshot(desk, frame))
-        return Outputs(newest(commands), desk.take_request(), desk.take_events(), tuple(snapshots))
+        safe = permitted(desk.view, self.autopilots, desk.fleet.tracks, newest(commands))
+        self._say_who_is_held(safe.held)
+        return Outputs(safe.commands, desk.take_request(), desk.take_events(), tuple(snapshots))
 
     def _excuse_absence(self, wall_s: float) -> None:
         """Links are not lost while nobody listened to them."""
         before_s, self._stepped_wall_s = self._stepped_wall_s, wall_s
         if before_s is not None and wall_s - before_s > ABSENT_S:
             self.desk.fleet.excuse(wall_s - before_s)
+
+    def _say_who_is_held(self, held: Sequence[Held]) -> None:
+        now = frozenset(held)
+        for one in sorted(now - self._held, key=lambda h: h.name):
+            self.desk.say("link", f"{one.name} is held: {one.reason}")
+        if held or self.desk.ended:
+            self._held = now
 
     def _prepare(self, wall_s: float) -> list[Command]:
         commands: list[Command] = []

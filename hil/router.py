@@ -81,17 +81,17 @@ class RouterEnd:
     """The link to one vehicle."""
 
     def __init__(self, router: Router, sysid: int) -> None:
-        self._router, self._sysid = router, sysid
+        self.router, self.sysid = router, sysid
 
     def send(self, datagram: bytes) -> None:
-        self._router.send(self._sysid, datagram)
+        self.router.send(self.sysid, datagram)
 
     def receive(self) -> list[bytes]:
-        return self._router.take(self._sysid)
+        return self.router.take(self.sysid)
 
     def guard(self, is_welcome: Callable[[bytes], bool], hear_of: Callable[[int], None]) -> None:
         """As `Router.guard`, for this vehicle."""
-        self._router.guard(self._sysid, is_welcome, hear_of)
+        self.router.guard(self.sysid, is_welcome, hear_of)
 
     def fileno(self) -> int:
-        return self._router.fileno()
+        return self.router.fileno()

@@ -5,6 +5,7 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
+from base_station.budget import refuse_overload
 from base_station.consent import ask_before_arming
 from base_station.identify.session import Identification
 from base_station.identify.store import write_fits
@@ -36,9 +37,10 @@ def identify(path: Path, out: Path | None) -> Path:
     view = load_station_view(path)
     identification = Identification(view)
     print(f"{len(view.fleet)} vehicles, {identification.duration_s:.0f} s of driving to and fro")
-    ask_before_arming(view)
+    refuse_overload(view)
     with ExitStack() as stack:
         links = open_links(stack, view)
+        ask_before_arming(view)
         node = StationNode(
             view, links, NoPlanner(), [identification], station=identification.station
         )

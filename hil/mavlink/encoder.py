@@ -5,6 +5,7 @@ import math
 from hil.mavlink.enums import (
     AUTOPILOT_INVALID,
     COMPONENT_AUTOPILOT,
+    FORCE_DISARM_MAGIC,
     MODE_FLAG_CUSTOM,
     TYPE_GCS,
     Command,
@@ -50,6 +51,12 @@ class Encoder(Framer):
     def arm(self, target: int, armed: bool = True) -> bytes:
         """MAV_CMD_COMPONENT_ARM_DISARM."""
         return self.command_long(target, Command.COMPONENT_ARM_DISARM, float(armed))
+
+    def emergency_stop(self, target: int) -> bytes:
+        """MAV_CMD_COMPONENT_ARM_DISARM: disarm whatever the state is."""
+        return self.command_long(
+            target, Command.COMPONENT_ARM_DISARM, 0.0, float(FORCE_DISARM_MAGIC)
+        )
 
     def set_mode(self, target: int, custom_mode: int) -> bytes:
         """MAV_CMD_DO_SET_MODE (176), which is acknowledged, unlike SET_MODE."""

@@ -182,3 +182,8 @@ def crc_extra_of(number: int) -> bytes | None:
     """The seed that a message's checksum ends with; None for a message not known."""
     layout = _LAYOUTS.get(number)
     return None if layout is None else layout.crc_extra
+
+
+def payload_bytes(number: int) -> int:
+    """The whole payload of a message, extensions included. Raises KeyError for one not known."""
+    return int(_LAYOUTS[number].packing.size)
