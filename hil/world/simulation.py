@@ -9,6 +9,7 @@ from hil.physics_link import decode_frame, encode_state
 from hil.scenario import Scenario
 from hil.world.lockstep import Lockstep
 from hil.world.orders import Break, Mend
+from hil.world.powering import Powering
 from hil.world.space import World
 from hil.world.tampering import Tampering
 from hil.world.truth import ContactEpisode, ContactLog, TruthRecord
@@ -34,6 +35,7 @@ class Simulation:
         self.world = World(scenario, seed)
         self.lockstep = Lockstep(tuple(v.sysid for v in scenario.fleet), scenario.clock.physics_hz)
         self._tampering = {v.sysid: Tampering(v.frame) for v in scenario.fleet}
+        self._powering = Powering(scenario.fleet)
         self._contact_log = ContactLog()
         self._samples = 0  # truth records made so far
 
@@ -72,7 +74,7 @@ class Simulation:
         target = min(self.lockstep.next_answer(), self._last_step(until_s))
         outputs = {
             sysid: self._tampering[sysid].outputs(pwm_us, self.time_s)
-            for sysid, pwm_us in self.lockstep.outputs().items()
+            for sysid, pwm_us in self._powering.outputs(self.lockstep.outputs()).items()
         }
         while self.world.steps < target:
             self.world.step(outputs)
