@@ -4,10 +4,19 @@ import os
 import termios
 import tty
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from enum import Enum
 from typing import TextIO
 
 STOP = b" "
+
+
+class Typed(Enum):
+    """STOP: the stop key was pressed. GONE: the terminal is no longer there."""
+
+    NOTHING = "nothing"
+    STOP = "stop"
+    GONE = "gone"
 
 
 class Keys:
@@ -20,15 +29,17 @@ class Keys:
         """For `select`."""
         return () if self._fd is None else (self._fd,)
 
-    def pressed(self, ready: Sequence[int]) -> bool:
-        """Whether the stop key is among what was typed; a terminal that is gone counts, too."""
+    def typed(self, ready: Sequence[int]) -> Typed:
+        """What has come from the terminal since it was last asked, if it is `ready`."""
         if self._fd is None or self._fd not in ready:
-            return False
+            return Typed.NOTHING
         try:
-            typed = os.read(self._fd, 1024)
+            text = os.read(self._fd, 1024)
         except OSError:
-            return True
-        return not typed or STOP in typed
+            return Typed.GONE
+        if not text:
+            return Typed.GONE
+        return Typed.STOP if STOP in text else Typed.NOTHING
 
 
 @contextmanager
@@ -42,4 +53,5 @@ def emergency_key(stdin: TextIO) -> Iterator[Keys]:
         yield Keys(fd)
     finally:
         if fd is not None and before is not None:
-            termios.tcsetattr(fd, termios.TCSADRAIN, before)
+            with suppress(termios.error):  # the terminal may be gone
+                termios.tcsetattr(fd, termios.TCSADRAIN, before)

@@ -22,7 +22,7 @@ from base_station.consent import ask_before_arming
 from base_station.dry import DryEnd
 from base_station.execution import hold
 from base_station.journal import Head, Journal, journal_files
-from base_station.keys import emergency_key
+from base_station.keys import Typed, emergency_key
 from base_station.listeners import open_listeners
 from base_station.node import StationNode
 from base_station.planner_child import PlannerChild
@@ -155,8 +155,11 @@ def run(arguments: argparse.Namespace) -> None:
             while not node.finished:
                 sources = [*(link.fileno() for link in links), planner.fileno(), *keys.filenos()]
                 ready, _, _ = select.select(sources, [], [], STEP_S)
-                if keys.pressed(ready):
+                typed = keys.typed(ready)
+                if typed is Typed.STOP:
                     raise EmergencyStop
+                if typed is Typed.GONE:
+                    raise StopRequested
                 node.step(time.monotonic() + offset_s, time.time_ns() // 1000)
         except EmergencyStop:
             node.emergency_stop()
