@@ -11,6 +11,7 @@ from hil.scenario import StationView
 
 REPEAT_S = 0.5
 STICK_US = 100
+SURE_BEATS = 2
 TAKEOVER_S = 2.5  # longer than two heartbeats: a late one must not look like a takeover
 
 
@@ -55,9 +56,9 @@ class Commander:
         for i, member in enumerate(self._view.fleet):
             if i in self.released:
                 continue
-            if self._is_strayed(i, tracks[i].status, time_s):
-                continue
             driven = bool(orders.driven[i])
+            if self._is_strayed(i, driven, tracks[i].status, time_s):
+                continue
             commands += self._mode(i, member.sysid, driven, tracks[i].status, time_s)
             if driven or self.autopilots[i].needs_setpoints_first:
                 north, east, yaw = (float(x) for x in orders.setpoints[i])
@@ -75,19 +76,28 @@ class Commander:
         if status.mode == wanted and not changed:
             self._sent[index] = replace(sent, confirmed=True)
             return []
-        if not changed and time_s - sent.time_s < REPEAT_S:
-            return []
+        if not changed and (sent.confirmed or time_s - sent.time_s < REPEAT_S):
+            return []  # one that was in it and has left is not argued with
         self._sent[index] = replace(sent, mode=wanted, time_s=time_s, confirmed=False)
         return [SetMode(sysid, wanted)]
 
-    def _is_strayed(self, index: int, status: Status, time_s: float) -> bool:
-        """Whether somebody else has this vehicle: it gets no command while that may be so."""
+    def _is_strayed(self, index: int, driven: bool, status: Status, time_s: float) -> bool:
+        """Whether somebody else has this vehicle: it gets no command while that may be so.
+
+        One heartbeat in the other of our modes may have been late, and a vehicle that has gone by
+        itself to the mode that it shall have now, as after a lost link, is not astray.
+        """
         autopilot, sent = self.autopilots[index], self._sent[index]
         was_armed = sent.was_armed or status.armed
         sticks_us = sent.sticks_us or status.sticks_us
         ours = (autopilot.driven_mode, autopilot.hold_mode)
         obeyed = sent.obeyed or status.mode in ours
-        left = sent.confirmed and status.mode != sent.mode
+        wanted = autopilot.driven_mode if driven else autopilot.hold_mode
+        left = (
+            sent.confirmed
+            and status.mode not in (sent.mode, wanted)
+            and status.mode_beats >= SURE_BEATS
+        )
         foreign = obeyed and status.mode not in ours
         strayed = left or foreign or (was_armed and not status.armed)
         strayed = strayed or _moved(sticks_us, status.sticks_us)

@@ -59,7 +59,7 @@ class Fleet:
     def mode_acknowledged(self, index: int, mode: int) -> None:
         """The vehicle said that it is in `mode` now, before its next heartbeat does."""
         track = self.tracks[index]
-        track.status = replace(track.status, mode=mode)
+        track.status = replace(track.status, mode=mode, mode_beats=0)
 
     @property
     def newest_s(self) -> float:

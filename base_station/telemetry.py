@@ -31,6 +31,7 @@ class Status:
     heard: bool = False
     armed: bool = False
     mode: int = -1
+    mode_beats: int = 0  # heartbeats in a row that have said so
     yaw_rad: float = float("nan")
     motor_outputs: tuple[float, ...] = ()
     battery_percent: float = float("nan")
@@ -88,7 +89,9 @@ def note(status: Status, value: object, motors: int) -> Status:
     """Status after one more message; messages that say nothing of it change nothing."""
     match value:
         case mavlink.Heartbeat():
-            return replace(status, heard=True, armed=value.armed, mode=value.custom_mode)
+            mode = value.custom_mode
+            beats = status.mode_beats + 1 if mode == status.mode else 1
+            return replace(status, heard=True, armed=value.armed, mode=mode, mode_beats=beats)
         case mavlink.Attitude():
             return replace(status, yaw_rad=value.yaw_rad)
         case mavlink.ServoOutputs():

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from base_station.commander import TAKEOVER_S, Commander
+from base_station.commander import SURE_BEATS, TAKEOVER_S, Commander
 from base_station.commands import Arm, Drive, SetMode
 from base_station.execution import hold
 from base_station.telemetry import Track
@@ -10,10 +10,10 @@ from hil.mavlink import RoverMode
 from hil.scenario import StationView
 
 
-def _tracks(mode: RoverMode, count: int = 3) -> list[Track]:
+def _tracks(mode: RoverMode, count: int = 3, beats: int = SURE_BEATS) -> list[Track]:
     tracks = [Track() for _ in range(count)]
     for track in tracks:
-        track.status = replace(track.status, mode=int(mode), armed=True)
+        track.status = replace(track.status, mode=int(mode), mode_beats=beats, armed=True)
     return tracks
 
 
@@ -85,6 +85,35 @@ def test_a_failsafe_that_leaves_the_driven_mode_is_not_argued_with(
     assert commander.carry_out(orders, _tracks(RoverMode.HOLD), 1.0) == []
     commander.carry_out(orders, _tracks(RoverMode.HOLD), 1.0 + TAKEOVER_S)
     assert commander.takeovers(1.0 + TAKEOVER_S) == [0]
+
+
+def test_a_late_heartbeat_is_no_takeover_and_is_not_argued_with(rescue_view: StationView) -> None:
+    commander, orders = Commander(rescue_view), _drive_first()
+    commander.carry_out(orders, _tracks(RoverMode.HOLD), 0.0)
+    guided = _tracks(RoverMode.HOLD)
+    guided[0].status = replace(guided[0].status, mode=int(RoverMode.GUIDED))
+    commander.carry_out(orders, guided, 0.1)
+    late = _tracks(RoverMode.HOLD, beats=1)
+    for time_s in (1.0, 1.0 + TAKEOVER_S):
+        (command,) = commander.carry_out(orders, late, time_s)
+        assert isinstance(command, Drive)
+    assert commander.takeovers(1.0 + TAKEOVER_S) == []
+
+
+def test_who_went_by_itself_to_the_mode_it_shall_have_was_not_taken_over(
+    rescue_view: StationView,
+) -> None:
+    commander = Commander(rescue_view)
+    commander.carry_out(_drive_first(), _tracks(RoverMode.HOLD), 0.0)
+    guided = _tracks(RoverMode.HOLD)
+    guided[0].status = replace(guided[0].status, mode=int(RoverMode.GUIDED))
+    commander.carry_out(_drive_first(), guided, 0.1)
+    for time_s in (5.0, 5.0 + TAKEOVER_S):  # the link was lost, its failsafe held it
+        commander.carry_out(hold(3), _tracks(RoverMode.HOLD), time_s)
+    assert commander.takeovers(5.0 + TAKEOVER_S) == []
+    assert commander.carry_out(_drive_first(), _tracks(RoverMode.HOLD), 9.0)[0] == SetMode(
+        1, RoverMode.GUIDED
+    )
 
 
 def test_a_disarm_nobody_commanded_is_a_takeover(rescue_view: StationView) -> None:
