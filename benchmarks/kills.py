@@ -53,6 +53,7 @@ class Result:
     orphans: int
     unreadable: tuple[str, ...]
     wall_s: float
+    said: str = ""
 
     @property
     def good(self) -> bool:
@@ -91,6 +92,7 @@ def one(victim: str, number: int, options: argparse.Namespace) -> Result:
             orphans=_orphans(str(out)),
             unreadable=tuple(_unreadable(out)),
             wall_s=round(time.monotonic() - began_s, 1),
+            said=words.strip()[-300:],
         )
 
 
