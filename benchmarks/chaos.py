@@ -77,7 +77,9 @@ class Result:
     @property
     def right(self) -> bool:
         expected = EXPECTED[self.cell.scenario]
-        return (self.verdict == expected) if self.decided else expected is None
+        if expected is None:
+            return not self.decided and not self.false_alarms
+        return self.decided and self.verdict == expected
 
     @property
     def wrong(self) -> bool:
