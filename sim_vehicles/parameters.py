@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from hil.airframe import Airframe
 from hil.mavlink import ParamError, ParamType, RoverMode
 
+ACCEPT_UNSIGNED = 1  # bit of MAV1_OPTIONS
+
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
@@ -65,8 +67,20 @@ def _fixed(name: str, value: float, param_type: ParamType = ParamType.INT16) -> 
     return Parameter(name, value, value, value, param_type, read_only=True)
 
 
-def rover_parameters(sysid: int, station_sysid: int, airframe: Airframe) -> Parameters:
-    """The table that a ground station sees. Names and units are ArduPilot Rover 4.6's."""
+def _options(signs: bool) -> Parameter:
+    """MAV1_OPTIONS (ArduPilot 4.7), of all ports here. Without a key there is nothing to choose."""
+    if not signs:
+        return _fixed("MAV1_OPTIONS", ACCEPT_UNSIGNED)
+    return Parameter("MAV1_OPTIONS", 0, 0, ACCEPT_UNSIGNED, ParamType.INT16)
+
+
+def rover_parameters(
+    sysid: int, station_sysid: int, airframe: Airframe, signs: bool = False
+) -> Parameters:
+    """The table that a ground station sees. Names and units are ArduPilot Rover 4.6's.
+
+    `signs`: the vehicle has a key to sign MAVLink with.
+    """
     limit_mps = airframe.speed_limit_mps
     int8, int16 = ParamType.INT8, ParamType.INT16
     first = 73 if airframe.steering == "skid" else 33  # throttle left and right, or motor 1
@@ -97,6 +111,7 @@ def rover_parameters(sysid: int, station_sysid: int, airframe: Airframe) -> Para
             *(_fixed(f"SERVO{i}_MIN", 1100) for i in range(1, len(airframe.motors) + 1)),
             *(_fixed(f"SERVO{i}_MAX", 1900) for i in range(1, len(airframe.motors) + 1)),
             *(_fixed(f"SERVO{i}_TRIM", 1500) for i in range(1, len(airframe.motors) + 1)),
+            _options(signs),
             *((Parameter("RTL_ALT", 500, 30, 300_000),) if airframe.flight else ()),  # cm
             Parameter("SYSID_MYGCS", station_sysid, 1, 255, int16),
             _fixed("SYSID_THISMAV", sysid),

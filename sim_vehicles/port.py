@@ -4,7 +4,7 @@ Answers go to who asked. Stations share services, but never with the injector.
 """
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from hil.mavlink import (
     COMPONENT_AUTOPILOT,
@@ -36,9 +36,10 @@ class Port:
         handlers: Handlers,
         streams: StreamService,
         signing: Signing | None = None,
+        unsigned_too: Callable[[], bool] = lambda: False,
     ) -> None:
         self._sysid, self._handlers, self._streams = sysid, handlers, streams
-        self._decoder = Decoder(signing)
+        self._decoder = Decoder(signing, unsigned_too)
         self._encoder = Encoder(sysid, COMPONENT_AUTOPILOT, signing)
         self._outbox: list[bytes] = []
         self._complained: Counter[Refusal] = Counter()

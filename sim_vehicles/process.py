@@ -118,13 +118,14 @@ def run(arguments: argparse.Namespace) -> None:
     signing_for = arguments.signing_key and signer(arguments.signing_key)
     vehicle = Vehicle(scenario, arguments.sysid, signing_for)
     keeper = None if arguments.params is None else ParameterKeeper(arguments.params, vehicle)
+    welcome = _welcome(signing_for, vehicle)
     with ExitStack() as stack:
         physics = UdpLink.connect(host, ports.physics)
         stack.callback(physics.close)
-        gcs = _hub((host, ports.mavlink), arguments.listen_port, signing_for)
+        gcs = _hub((host, ports.mavlink), arguments.listen_port, welcome)
         stack.callback(gcs.close)
         injector = _bound(host, ports.injector)
-        injector.guard(_welcome(signing_for))
+        injector.guard(welcome)
         stack.callback(injector.close)
         if not is_here(host):
             print(f"listens to other machines, too, for {host}", file=sys.stderr, flush=True)
@@ -142,16 +143,16 @@ def signer(path: Path) -> SigningFor:
     return lambda link_id: Signing(key, link_id, lambda: ticks(time.time()), streams)
 
 
-def _welcome(signing_for: SigningFor | None) -> Callable[[bytes], bool]:
-    """Whether a stranger's datagram is valid, and signed if we sign."""
-    decoder = Decoder(signing_for(0) if signing_for else None)
+def _welcome(signing_for: SigningFor | None, vehicle: Vehicle) -> Callable[[bytes], bool]:
+    """Whether a stranger's datagram is valid, and signed where that is asked for."""
+    decoder = Decoder(signing_for(0) if signing_for else None, vehicle.hears_unsigned)
     return lambda datagram: bool(decoder.peek(datagram))
 
 
-def _hub(host: Address, port: int, signing_for: SigningFor | None) -> UdpHub:
-    """A stranger has to say something valid, and signed if we sign, before it is listened to."""
+def _hub(host: Address, port: int, welcome: Callable[[bytes], bool]) -> UdpHub:
+    """Strangers have to be welcome before they are listened to."""
     try:
-        return UdpHub.open(host, port, _welcome(signing_for))
+        return UdpHub.open(host, port, welcome)
     except OSError as error:
         raise InputError(
             f"--listen-port {port} cannot be bound: {error.strerror}; choose another"

@@ -22,7 +22,7 @@ from sim_vehicles.guard import Guard
 from sim_vehicles.helm import Helm
 from sim_vehicles.mission import Surroundings
 from sim_vehicles.navigator import Navigator
-from sim_vehicles.parameters import Parameters, rover_parameters
+from sim_vehicles.parameters import ACCEPT_UNSIGNED, Parameters, rover_parameters
 from sim_vehicles.port import Port
 from sim_vehicles.ports import PortName, Ports
 from sim_vehicles.senses import Senses
@@ -64,7 +64,9 @@ class Vehicle:
         self._drive = Drive.of(member.frame, scenario.yaw == "locked")
         barometer = Barometer(scenario.seed, sysid) if member.frame.flight else None
         self._senses = Senses(scenario.sensors, scenario.seed, sysid, barometer)
-        self._parameters = rover_parameters(sysid, scenario.links.station_sysid, member.frame)
+        self._parameters = rover_parameters(
+            sysid, scenario.links.station_sysid, member.frame, signs=signing_for is not None
+        )
         self._navigator = Navigator(self._origin, member.frame.flight is not None)
         self._guard = Guard(self._parameters, self._navigator, self._senses)
         self._piloting = PilotingService(member.frame.flight is not None)
@@ -109,7 +111,7 @@ class Vehicle:
         sizes = ParameterService(self._failures.sizes)
         handlers = merged(*(service.handlers() for service in (commands, sizes, time, ftp)))
         signing = self._signing_for(INJECTOR_LINK) if self._signing_for else None
-        return Port(self._sysid, handlers, beats, signing)
+        return Port(self._sysid, handlers, beats, signing, self.hears_unsigned)
 
     def _station_port(self, peer: int) -> Port:
         """A port for one more station: shared services, streams and signatures of its own."""
@@ -117,7 +119,7 @@ class Vehicle:
         commands = CommandService({**streams.executors(), **self._executors})
         handlers = merged(self._handlers, commands.handlers(), streams.handlers())
         signing = self._signing_for(peer % INJECTOR_LINK) if self._signing_for else None
-        return Port(self._sysid, handlers, streams, signing)
+        return Port(self._sysid, handlers, streams, signing, self.hears_unsigned)
 
     @property
     def sysid(self) -> int:
@@ -132,6 +134,10 @@ class Vehicle:
     def parameters(self) -> Parameters:
         """What a station may set; for whoever keeps them."""
         return self._parameters
+
+    def hears_unsigned(self) -> bool:
+        """Whether frames without a signature count (MAV1_OPTIONS); without a key they do."""
+        return bool(int(self._parameters["MAV1_OPTIONS"]) & ACCEPT_UNSIGNED)
 
     def receive(self, port: PortName, datagram: bytes, peer: int = 0) -> None:
         """Handle a datagram now. Bad frames and frames for others change nothing.

@@ -67,11 +67,14 @@ class Decoder:
 
     A frame whose checksum is wrong is dropped whether or not it says it is signed: MAVLink's C
     parser accepts such a frame when signing is off, and one has disarmed a rover. With `signing`
-    only signed frames count; without it signatures are not looked at.
+    only signed frames count, and unsigned ones while `unsigned_too` says so; without it signatures
+    are not looked at.
     """
 
-    def __init__(self, signing: Signing | None = None) -> None:
-        self._signing = signing
+    def __init__(
+        self, signing: Signing | None = None, unsigned_too: Callable[[], bool] = lambda: False
+    ) -> None:
+        self._signing, self._unsigned_too = signing, unsigned_too
         self.dropped = 0  # stretches of bytes or frames that gave no value
         self.refused: Counter[Refusal] = Counter()  # those of them that signing refused, and why
 
@@ -101,6 +104,8 @@ class Decoder:
         if signing is None:
             return True
         if frame[0] != MARKER_V2 or not frame[2] & FLAG_SIGNED:
+            if self._unsigned_too():
+                return True
             self.refused["unsigned"] += 1
         elif not signing.is_genuine(frame):
             self.refused["forged"] += 1

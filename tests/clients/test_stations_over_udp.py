@@ -84,6 +84,13 @@ def test_with_a_key_only_signed_stations_are_heard(tmp_path: Path) -> None:
         assert message(right, "HEARTBEAT").get_signed()
         assert unsigned.recv_msg() is None
         assert wrong.recv_msg() is None
+        right.mav.param_set_send(SYSID, 1, b"MAV1_OPTIONS", 1.0, 4)
+        while message(right, "PARAM_VALUE").param_id != "MAV1_OPTIONS":
+            pass
+        for stranger in (unsigned, wrong):
+            stranger.mav.heartbeat_send(6, 8, 0, 0, 4)
+        assert message(unsigned, "HEARTBEAT").get_srcSystem() == SYSID
+        assert wrong.recv_msg() is None
 
 
 def test_changed_parameters_are_kept(tmp_path: Path) -> None:

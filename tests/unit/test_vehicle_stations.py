@@ -9,6 +9,7 @@ from vehicle_harness import Harness
 
 from hil.errors import InputError
 from hil.mavlink import (
+    AutopilotVersion,
     CommandAck,
     Decoder,
     Encoder,
@@ -18,6 +19,8 @@ from hil.mavlink import (
     MessageId,
     MissionAck,
     MissionClearAll,
+    ParamError,
+    ParamFailed,
     ParamValue,
     Severity,
     Signing,
@@ -119,6 +122,39 @@ def test_what_one_station_has_signed_is_nobody_elses_to_say_again(rescue: Scenar
     vehicle.receive("injector", broken)
     (told,) = (r.value for d in vehicle.outbox("injector") for r in Decoder().decode(d))
     assert told == StatusText(Severity.WARNING, "1 frames refused: not signed")
+
+
+def test_a_parameter_switches_whether_unsigned_frames_count(rescue: Scenario) -> None:
+    key = key_of("a pass phrase")
+    sign: Callable[[int], Signing] = lambda link_id: Signing(key, link_id, lambda: 10**12)  # noqa: E731
+    vehicle, signer = Vehicle(rescue, 2, sign), Encoder(245, 190, sign(7))
+
+    def answers(datagram: bytes) -> list[type]:
+        vehicle.receive("gcs", datagram)
+        said = [r.value for d in vehicle.outbox("gcs") for r in Decoder(sign(0)).decode(d)]
+        return [type(v) for v in said if not isinstance(v, StatusText)]
+
+    unsigned = OTHER.request_message(2, MessageId.AUTOPILOT_VERSION)
+    version = [CommandAck, AutopilotVersion]
+    assert answers(unsigned) == []
+    assert answers(OTHER.param_set(2, "MAV1_OPTIONS", 1.0)) == []  # nobody without the key opens it
+    opened = signer.param_set(2, "MAV1_OPTIONS", 1.0)
+    assert answers(opened) == [ParamValue]
+    assert answers(unsigned) == version
+    asked = signer.request_message(2, MessageId.AUTOPILOT_VERSION)
+    assert answers(asked[:-1] + bytes([asked[-1] ^ 1])) == []  # what is signed must be so rightly
+    assert answers(asked) == version
+    assert answers(asked) == []
+    assert answers(signer.param_set(2, "MAV1_OPTIONS", 0.0)) == [ParamValue]
+    assert answers(unsigned) == []
+    assert answers(opened) == []
+
+
+def test_without_a_key_unsigned_frames_always_count(rover: Harness) -> None:
+    assert rover.vehicle.parameters["MAV1_OPTIONS"] == 1.0
+    rover.tell(rover.station.param_set(2, "MAV1_OPTIONS", 0.0))
+    assert [p.error for p in rover.values(ParamFailed)] == [ParamError.READ_ONLY]
+    assert rover.vehicle.hears_unsigned()
 
 
 def test_changed_parameters_survive(rescue: Scenario, tmp_path: Path) -> None:
