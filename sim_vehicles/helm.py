@@ -76,7 +76,11 @@ class Helm:
 
     def apply(self, change: Change) -> Result:
         """Put a transition into effect; its texts go to every station."""
-        transition: Transition = change(self.autopilot, self.ready)
+        return self._put(change(self.autopilot, self.ready))
+
+    def _put(self, transition: Transition) -> Result:
+        if transition.state is self.autopilot and not transition.texts:
+            return transition.result
         before, self.autopilot = self.autopilot, transition.state
         if (before.mode, before.armed) != (self.autopilot.mode, self.autopilot.armed):
             self._memory = self._memory.afresh(self._senses.estimate().yaw_rad)
@@ -124,18 +128,18 @@ class Helm:
         for trip in trips:
             self._check(trip)
         self._check_sticks(now_s)
-        self.apply(lambda state, _ready: check_target(state, now_s))
+        self._put(check_target(self.autopilot, now_s))
 
     def _check(self, trip: Trip) -> None:
         known, flies = self.autopilot.tripped, self._navigator.flies
-        self.apply(lambda state, _ready: check(state, trip.which, trip.tripped, trip.action, flies))
+        self._put(check(self.autopilot, trip.which, trip.tripped, trip.action, flies))
         if self.autopilot.tripped - known and trip.action is RoverMode.HOLD and self._hovers:
             self._memory = land(self._memory)
 
     def _check_sticks(self, now_s: float) -> None:
         by_hand, flies = self.autopilot.mode is RoverMode.MANUAL, self._navigator.flies
         released = self._piloting.sticks.are_released(now_s)
-        self.apply(lambda state, _ready: check_sticks(state, released, flies))
+        self._put(check_sticks(self.autopilot, released, flies))
         if by_hand and self.autopilot.mode is RoverMode.HOLD and self._hovers:
             self._memory = land(self._memory)
 
@@ -150,7 +154,7 @@ class Helm:
         self._tell(told)
         done = mode is RoverMode.AUTO and self._navigator.progress.complete
         if done and self._navigator.flies and not self._memory.airborne:
-            self.apply(lambda state, _ready: disarm(state))
+            self._put(disarm(self.autopilot))
 
     def air(self) -> Air | None:
         """Where what flies is."""
@@ -180,7 +184,7 @@ class Helm:
         if self._lands and has_landed(self._memory):
             self._memory = settle(self._memory)
             if self.autopilot.mode is not RoverMode.AUTO:  # a mission may go on
-                self.apply(lambda state, _ready: disarm(state))
+                self._put(disarm(self.autopilot))
         return outputs
 
     def _by_hand(self, estimate: Estimate, dt_s: float) -> Outputs:

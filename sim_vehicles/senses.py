@@ -21,6 +21,7 @@ class Senses:
         self._inertial = InertialSensors(sensors, seed, sysid)
         self._gps = Gps(sensors, seed, sysid)
         self._estimator = Estimator(sensors)
+        self._estimate = self._estimator.estimate()
         self.sample: Inertial | None = None
         self.fix: GpsFix | None = None
         self.innovation = Innovation()
@@ -39,9 +40,10 @@ class Senses:
             self._estimator.gps(fix)
         elif self._estimator.fix_age_s > FIX_LOST_AFTER_S:
             self.fix = None
+        self._estimate = self._estimator.estimate()
         if self.home_m is not None or not self._estimator.ready:
             return False
-        self.home_m = self._estimator.estimate().position_m
+        self.home_m = self._estimate.position_m
         return True
 
     def _climb(self, down_m: float, sample: Inertial, dt_s: float) -> None:
@@ -54,7 +56,8 @@ class Senses:
         return self.home_m is not None and self._estimator.fix_age_s > BLIND_AFTER_S
 
     def estimate(self) -> Estimate:
-        return self._estimator.estimate()
+        """As it was after the last `feel`."""
+        return self._estimate
 
     @property
     def ready(self) -> bool:

@@ -6,7 +6,7 @@ time.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from functools import partial
+from functools import cache, partial
 
 from hil.airframe import output_to_pwm
 from hil.damage import MotorOutputs
@@ -85,6 +85,7 @@ class Vehicle:
         self._pwm = pad_channels(())
         self._telemetry_hz, self._signing_for = scenario.clock.telemetry_hz, signing_for
         self._failures = FailureService(injection_parameters(), member.frame)
+        self._look: Callable[[], Snapshot] = self._snapshot
         self._handlers, self._executors = self._services()
         self._ports = Ports(self._injector_port(), self._station_port)
 
@@ -177,7 +178,9 @@ class Vehicle:
         outputs = self._helm.outputs(dt_s)
         self._battery = drain(self._battery, loads(self._drive.airframe, outputs), dt_s)
         self._pwm = pad_channels([output_to_pwm(output) for output in outputs])
+        self._look = cache(self._snapshot)  # streams of one frame tell of one moment
         self._ports.step(state.time_s)
+        self._look = self._snapshot
 
     def _surroundings(self, now_s: float) -> Surroundings:
         return Surroundings(
@@ -200,7 +203,7 @@ class Vehicle:
         return {number: partial(self._build, build) for number, build in BUILDERS.items()}
 
     def _build(self, build: Callable[[Snapshot], Message | None]) -> Message | None:
-        return build(self._snapshot())
+        return build(self._look())
 
     def _snapshot(self) -> Snapshot:
         now_s, airframe = self.time_s, self._drive.airframe

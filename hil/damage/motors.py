@@ -11,6 +11,7 @@ class MotorOutputs:
 
     def __init__(self, airframe: Airframe) -> None:
         self._airframe = airframe
+        self._sound = (MotorDamage(),) * len(airframe.motors)
         self._last: tuple[int, ...] = (PWM_OFF_US,) * len(airframe.motors)
         self._held: dict[int, int] = {}
 
@@ -18,6 +19,10 @@ class MotorOutputs:
         self, motors: Sequence[MotorDamage], pwm_us: tuple[int, ...], now_s: float
     ) -> tuple[int, ...]:
         """PWM (us) for the physics; channels beyond the motors pass."""
+        if motors == self._sound:
+            self._held.clear()
+            self._last = pwm_us[: len(self._sound)]
+            return pwm_us
         out = tuple(self._one(i, m, pwm_us[i], now_s) for i, m in enumerate(motors))
         self._last = out
         return (*out, *pwm_us[len(out) :])
