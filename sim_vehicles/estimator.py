@@ -2,7 +2,8 @@
 
 One constant-velocity Kalman filter per NED axis, with acceleration as process noise. All axes see
 the same noise at the same times, so they share one covariance. Without fixes the last velocity is
-believed; only the climb of what flies then follows accelerometer and barometer.
+believed. Height and climb of what flies come from barometer and accelerometer alone, so that a GPS
+that sticks or drifts can't fool them (ArduPilot Copter takes the climb from the GPS).
 """
 
 import math
@@ -14,7 +15,7 @@ from hil.scenario import Sensors as Noise
 from sim_vehicles.sensors import GpsFix, Inertial, Vector
 
 ACCELERATION_SIGMA_MPS2 = 1.5
-BARO_GAINS = 0.1, 0.005  # alpha and beta: settles within a second at 50 Hz
+BARO_GAINS = 0.07, 0.0025  # alpha and beta: settles within a second at 50 Hz
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +33,8 @@ class Estimate:
 class Estimator:
     """Feed it each step in order: `inertial`, then `gps` when there is a fix."""
 
-    def __init__(self, noise: Noise) -> None:
+    def __init__(self, noise: Noise, has_barometer: bool = False) -> None:
+        self._gps_axes = 2 if has_barometer else 3
         self._position_variance = noise.gps_position_sigma_m**2 + noise.gps_wander_sigma_m**2
         self._velocity_variance = noise.gps_velocity_sigma_mps**2
         self._fixes_needed = noise.gps_hz  # one second of them
@@ -70,7 +72,7 @@ class Estimator:
         self._predict(dt_s)
 
     def barometer(self, down_m: float, sample: Inertial, dt_s: float) -> None:
-        """Height and climb without a fix, for what flies: accelerometer, corrected by barometer."""
+        """Height and climb of what flies: accelerometer, corrected by barometer."""
         roll, pitch = sample.level_rad
         upright = math.cos(roll) * math.cos(pitch)
         gained_mps = (GRAVITY_MPS2 + sample.accel_mps2[2] * upright) * dt_s
@@ -85,7 +87,7 @@ class Estimator:
         self._fixes += 1
         self.fix_age_s = 0.0
         if self._fixes == 1:
-            self._axes = list(fixed)
+            self._axes = [*fixed[: self._gps_axes], *self._axes[self._gps_axes :]]
             self._covariance = (self._position_variance, 0.0, self._velocity_variance)
             return
         pp, pv, vv = self._covariance
@@ -96,7 +98,8 @@ class Estimator:
         s = vv + self._velocity_variance
         lp, lv = pv / s, vv / s
         self._covariance = (pp - lp * pv, pv - lp * vv, vv - lv * vv)
-        for i, ((p, v), (seen_p, seen_v)) in enumerate(zip(self._axes, fixed, strict=True)):
+        for i in range(self._gps_axes):
+            (p, v), (seen_p, seen_v) = self._axes[i], fixed[i]
             innovation = seen_p - p
             p, v = p + kp * innovation, v + kv * innovation
             innovation = seen_v - v

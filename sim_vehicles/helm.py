@@ -63,7 +63,7 @@ class Helm:
         self._navigator, self._parameters = navigator, parameters
         self._piloting, self._readiness, self._tell = piloting, readiness, tell
         self._memory = Memory()
-        self._now_s = 0.0
+        self._now_s = self._idle_since_s = 0.0
         self.autopilot = Autopilot()
 
     @property
@@ -129,6 +129,7 @@ class Helm:
             self._check(trip)
         self._check_sticks(now_s)
         self._put(check_target(self.autopilot, now_s))
+        self._check_idle(now_s)
 
     def _check(self, trip: Trip) -> None:
         known, flies = self.autopilot.tripped, self._navigator.flies
@@ -142,6 +143,14 @@ class Helm:
         self._put(check_sticks(self.autopilot, released, flies))
         if by_hand and self.autopilot.mode is RoverMode.HOLD and self._hovers:
             self._memory = land(self._memory)
+
+    def _check_idle(self, now_s: float) -> None:
+        """What flies does not stay armed on the ground; in AUTO the mission may go on."""
+        armed, auto = self.autopilot.armed, self.autopilot.mode is RoverMode.AUTO
+        if not (armed and self._navigator.flies) or self._memory.airborne or auto:
+            self._idle_since_s = now_s
+        elif 0.0 < self._parameters["DISARM_DELAY"] <= now_s - self._idle_since_s:
+            self._put(disarm(self.autopilot))
 
     def navigate(self, around: Surroundings) -> None:
         """In AUTO and RTL the navigator sets the target."""

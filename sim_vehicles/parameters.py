@@ -67,6 +67,14 @@ def _fixed(name: str, value: float, param_type: ParamType = ParamType.INT16) -> 
     return Parameter(name, value, value, value, param_type, read_only=True)
 
 
+def _of_flight() -> tuple[Parameter, ...]:
+    """ArduPilot Copter's."""
+    return (
+        Parameter("DISARM_DELAY", 10, 0, 127, ParamType.INT8),  # s armed on the ground, 0 never
+        Parameter("RTL_ALT", 500, 30, 300_000),  # cm
+    )
+
+
 def _options(signs: bool) -> Parameter:
     """MAV1_OPTIONS (ArduPilot 4.7), of all ports here. Without a key there is nothing to choose."""
     if not signs:
@@ -112,7 +120,7 @@ def rover_parameters(
             *(_fixed(f"SERVO{i}_MAX", 1900) for i in range(1, len(airframe.motors) + 1)),
             *(_fixed(f"SERVO{i}_TRIM", 1500) for i in range(1, len(airframe.motors) + 1)),
             _options(signs),
-            *((Parameter("RTL_ALT", 500, 30, 300_000),) if airframe.flight else ()),  # cm
+            *(_of_flight() if airframe.flight else ()),
             Parameter("SYSID_MYGCS", station_sysid, 1, 255, int16),
             _fixed("SYSID_THISMAV", sysid),
             Parameter("WP_RADIUS", 0.2, 0.05, 100),

@@ -20,7 +20,7 @@ class Senses:
         self._noise, self._barometer = sensors, barometer
         self._inertial = InertialSensors(sensors, seed, sysid)
         self._gps = Gps(sensors, seed, sysid)
-        self._estimator = Estimator(sensors)
+        self._estimator = Estimator(sensors, barometer is not None)
         self._estimate = self._estimator.estimate()
         self.sample: Inertial | None = None
         self.fix: GpsFix | None = None
@@ -32,7 +32,9 @@ class Senses:
         self.sample = self._inertial.sample(state, damage.gyro, damage.accel)
         self._estimator.inertial(self.sample, dt_s)
         if self._barometer is not None:
-            self._climb(self._barometer.sample(state), self.sample, dt_s)
+            down_m = self._barometer.sample(state)
+            if dt_s > 0.0:
+                self._estimator.barometer(down_m, self.sample, dt_s)
         fix = self._gps.sample(state, damage.gps)
         if fix is not None:
             self.fix = fix
@@ -45,10 +47,6 @@ class Senses:
             return False
         self.home_m = self._estimate.position_m
         return True
-
-    def _climb(self, down_m: float, sample: Inertial, dt_s: float) -> None:
-        if self.is_blind and dt_s > 0.0:
-            self._estimator.barometer(down_m, sample, dt_s)
 
     @property
     def is_blind(self) -> bool:

@@ -116,6 +116,23 @@ def test_quad_follows_a_velocity_in_all_axes(quad: InWorld, velocity: Velocity) 
     assert (v.north_mps, v.east_mps, v.down_mps) == pytest.approx(velocity, abs=0.2)
 
 
+@pytest.mark.parametrize(
+    "fault",
+    [
+        Fault(Unit.GPS, Type.STUCK),
+        Fault(Unit.GPS, Type.OFFSET, size=(0.0, 0.0, -4.0)),
+        Fault(Unit.GPS, Type.DRIFT, size=(0.0, 0.0, 0.5)),
+    ],
+    ids=lambda fault: fault.type.value,
+)
+def test_height_is_the_barometers_and_no_gps_fools_it(quad: InWorld, fault: Fault) -> None:
+    quad.inject(to_injection(fault))
+    quad.run(4.0, {1: (0.0, 0.0, -0.5)})
+    quad.run(3.0, {1: REST})
+    assert quad.truth().down_m == pytest.approx(-7.0, abs=0.2)
+    assert quad.reported().position_m[2] == pytest.approx(quad.truth().down_m, abs=0.1)
+
+
 def test_quad_tilts_no_further_than_its_limit(quad: InWorld) -> None:
     assert QUAD_X.flight is not None
     steepest = 0.0

@@ -168,6 +168,34 @@ def test_a_flight_by_hand_from_the_ground_to_the_ground(ground: InWorld) -> None
     assert ordered(ground, Command.COMPONENT_ARM_DISARM, 0.0) == Result.ACCEPTED
 
 
+def test_ten_seconds_on_the_ground_disarm(ground: InWorld) -> None:
+    """DISARM_DELAY: counted anew after each landing; the throttle has to stay at the bottom."""
+    assert ordered(ground, Command.COMPONENT_ARM_DISARM, 1.0) == Result.ACCEPTED
+    by_hand(ground, sticks(throttle=BOTTOM), 9.0)
+    by_hand(ground, sticks(throttle=0.6), 1.0)
+    by_hand(ground, sticks(throttle=0.48), 4.0)
+    by_hand(ground, sticks(throttle=BOTTOM), 9.0)
+    assert ground.truth().down_m == 0.0
+    assert ground.sent(Heartbeat)[-1].armed
+    by_hand(ground, sticks(throttle=BOTTOM), 6.0)
+    assert not ground.sent(Heartbeat)[-1].armed
+    assert ground.pwm[1][:4] == (0, 0, 0, 0)
+    assert ground.sent(StatusText)[-1].text == "Throttle disarmed"
+
+
+@pytest.mark.parametrize(("delay_s", "armed_s"), [(3.0, 3.0), (0.0, 12.0)])
+def test_how_long_it_stays_armed_on_the_ground_in_guided(delay_s: float, armed_s: float) -> None:
+    world = InWorld(scenario("quad_x"))
+    world.tell(PERSON.param_set(1, "DISARM_DELAY", delay_s))
+    world.guided()
+    world.run(armed_s - 0.1)
+    assert world.vehicles[1].parameters["DISARM_DELAY"] == delay_s
+    world.run(1.0)
+    beats = world.sent(Heartbeat)
+    assert any(b.armed for b in beats)
+    assert beats[-1].armed == (delay_s == 0.0)
+
+
 def test_nobody_at_the_sticks_stays_on_the_ground(ground: InWorld) -> None:
     assert ordered(ground, Command.COMPONENT_ARM_DISARM, 1.0) == Result.ACCEPTED
     ground.run(5.0)
