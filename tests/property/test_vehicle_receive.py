@@ -213,8 +213,8 @@ ITEMS = st.builds(
 def test_whatever_is_uploaded_the_vehicle_drives_on(kind: str, messages: list[MissionItem]) -> None:
     subject = vehicle(kind)
     subject.guided()
-    for kind in (0, 1, 2):
-        subject.tell(STATION.encode(MissionCount(2, 1, 2, kind)))
+    for list_type in (0, 1, 2):
+        subject.tell(STATION.encode(MissionCount(2, 1, 2, list_type)))
         for message in messages:
             subject.tell(STATION.encode(message))
     subject.tell(STATION.param_set(2, "FENCE_ENABLE", 1.0))
