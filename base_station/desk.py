@@ -32,7 +32,8 @@ class Desk:
         self.alarmed: dict[int, tuple[float, float]] = {}  # vehicle: last quiet, alarm (s)
         self.doubt: Doubt | None = None
         self.verdict: Verdict | None = None
-        self.tries = 0  # experiments on the present suspect
+        self.tries = 0  # experiments on the present suspect ...
+        self.soloed = False  # ... and whether it has been driven alone
         self.goals = mission.Goals.of(view)
         self.mission_plans = 0
         self.mission_s = 0.0  # on the way, planning not counted

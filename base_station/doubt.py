@@ -1,4 +1,4 @@
-"""A suspect under doubt: one twin per hypothesis, each carrying its own state and its evidence.
+"""A suspect under doubt: twins for each hypothesis, each carrying its own state and its evidence.
 
 While a vehicle is in doubt its twins are driven by the orders sent and by the neighbours as they
 are seen, and never drawn towards the suspect's own reports: those are what is being judged.
@@ -10,12 +10,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station import diagnosis, twin
-from base_station.diagnosis import Fit, Verdict
+from base_station import diagnosis, observer, particles, twin
+from base_station.diagnosis import Fit, ReportFaults, Verdict
 from base_station.execution import Orders
 from base_station.hypotheses import Hypothesis
+from base_station.particles import DRAWS, Particles
 from base_station.telemetry import Frame
-from base_station.watch import CORRECTION_TIME_S, Baseline, correct
+from base_station.watch import CORRECTION_TIME_S, Baseline
+from hil.faults import Type, Unit
 
 Array = NDArray[np.float64]
 
@@ -26,14 +28,17 @@ FLOOR = 1e-3  # 'something else' is never ruled out before an experiment
 class Doubt:
     """`prior` [H] are log weights before `fit` and `unknown` began; T of the H have a twin, first.
 
-    `states` [T, V, S]; `last_report_m` [2] is the report judged last, at `judged_s`.
+    Rows [R] are those of `particles`: `states` [R, V, S]; `trail_m` [L, R, 2] what they expected
+    of the suspect at the last ticks, the newest last. `last_report_m` [2] was judged at `judged_s`.
     """
 
     baseline: Baseline
     suspect: int
     hypotheses: tuple[Hypothesis, ...]
+    particles: Particles
     prior: Array
     states: Array
+    trail_m: Array
     fit: Fit
     unknown: float
     last_report_m: Array
@@ -41,17 +46,14 @@ class Doubt:
 
     @property
     def twins(self) -> tuple[Hypothesis, ...]:
-        return tuple(h for h in self.hypotheses if h.has_twin)
-
-    @property
-    def faults(self) -> twin.FaultArrays:
-        return self.baseline.faults(self.twins)
+        return self.particles.twins
 
     @property
     def log_weights(self) -> Array:
-        """[H], not normalised."""
+        """[H], not normalised: the evidence of a twin is the mean over its draws."""
+        evidence = _log_mean_exp(self.fit.log_likelihood.reshape(DRAWS, -1))
         beyond = [self.unknown] * (len(self.hypotheses) - len(self.twins))
-        return np.asarray(self.prior + np.array([*self.fit.log_likelihood, *beyond]))
+        return np.asarray(self.prior + np.array([*evidence, *beyond]))
 
     @property
     def posterior(self) -> Array:
@@ -59,14 +61,32 @@ class Doubt:
         return diagnosis.posterior(self.log_weights)
 
     @property
-    def report_m(self) -> Array:
-        """[T, V, 2]: what each twin expects to receive."""
-        return np.asarray(twin.report(self.states, self.faults))
+    def likeliest(self) -> Array:
+        """[T] for each twin the row that explains the reports best."""
+        by_draw = self.fit.log_likelihood.reshape(DRAWS, -1)
+        return np.asarray(by_draw.argmax(axis=0) * len(self.twins) + np.arange(len(self.twins)))
 
-    @property
-    def sigma_m(self) -> Array:
-        """[T, 2]: spread of what each twin expects of the suspect."""
-        return self.fit.sigma_m
+    def of_twins(self) -> tuple[Array, Array, Array]:
+        """For each twin its likeliest row: state [T, V, S], report [T, V, 2], sigma [T, 2]."""
+        rows, motion = self.likeliest, self.particles.motion
+        faults = twin.FaultArrays(*(f[rows] for f in motion))
+        sigma_m = diagnosis.sigma_m(self.fit, self.particles.reports.noise_m)[rows]
+        reports_m = twin.report(self.states[rows], faults)
+        reports_m[:, self.suspect] += self.fit.offset_m[rows]
+        return self.states[rows], reports_m, sigma_m
+
+    def estimated(self, index: int) -> Hypothesis:
+        """A twin's hypothesis with the size of its fault as far as it is known by now."""
+        hypothesis, count = self.twins[index], len(self.twins)
+        weights = diagnosis.posterior(self.fit.log_likelihood[index::count])
+        if hypothesis.kind == (Unit.GPS, Type.OFFSET):
+            north, east = (float(x) for x in weights @ self.fit.offset_m[index::count])
+            return hypothesis.sized(north, east, 0.0)
+        if hypothesis.kind == (Unit.GPS, Type.DRIFT):
+            north, east = (float(x) for x in weights @ self.fit.drift_mps[index::count])
+            return hypothesis.sized(north, east, 0.0)
+        size = float(weights @ self.particles.sizes[index::count])
+        return hypothesis if np.isnan(size) else hypothesis.sized(size)
 
     def verdict(self, decide_at: float) -> Verdict:
         return diagnosis.decide(self.hypotheses, self.log_weights, decide_at)
@@ -74,28 +94,40 @@ class Doubt:
 
 def tick(doubt: Doubt, frame: Frame, orders: Orders, period_s: float) -> Doubt:
     """Move every twin on by one telemetry period, and judge the suspect's report when it is due."""
-    return advanced(doubt, doubt.faults, frame, orders, period_s)
+    faults, corrected = doubt.particles, doubt.baseline.corrected(frame)
+    return advanced(doubt, faults.motion, faults.reports, corrected, orders, period_s)
 
 
 def anchor(doubt: Doubt, report_m: Array) -> Doubt:
     """Start afresh from a fleet at rest in HOLD whose mean reports are `report_m` [V, 2].
 
-    Every twin takes over what its hypothesis trusts; on a stuck axis the report only says where
-    it is stuck, and the vehicle stays where this twin has reckoned it to be.
+    Draws that explained little make room for others. Every twin takes over what its hypothesis
+    trusts; on a stuck axis the report only says where it is stuck, and after a jump or a drift how
+    far off it is: there the vehicle stays where this twin has reckoned it to be.
     """
-    states = doubt.states.copy()
-    stuck = doubt.faults.gps_stuck > 0.5
+    rng = np.random.default_rng(round(doubt.judged_s * 1000))
+    drawn, rows = particles.resampled(
+        doubt.particles, doubt.baseline, doubt.fit.log_likelihood.reshape(DRAWS, -1), rng
+    )
+    states = doubt.states[rows]
+    stuck = drawn.motion.gps_stuck > 0.5
+    blind = stuck.copy()
+    moved_off = (drawn.reports.jump_m > 0.0) | (drawn.reports.drift_mps > 0.0)
+    blind[:, doubt.suspect] |= moved_off[:, None]
     position = states[..., twin.NORTH : twin.EAST + 1]
     held = states[..., twin.HELD_NORTH : twin.HELD_EAST + 1]
-    position[...] = np.where(stuck, position, report_m)
+    position[...] = np.where(blind, position, report_m)
     held[...] = np.where(stuck, report_m, held)
     for column in (twin.V_NORTH, twin.V_EAST, twin.YAW_RATE, twin.I_X, twin.I_Y):
         states[..., column] = 0.0
+    suspect_m = twin.report(states, drawn.motion)[:, doubt.suspect]
     return replace(
         doubt,
+        particles=drawn,
         prior=np.log(doubt.posterior + 1e-300),
         states=states,
-        fit=diagnosis.fresh_fit(len(doubt.twins)),
+        trail_m=np.repeat(suspect_m[None], len(doubt.trail_m), axis=0),
+        fit=diagnosis.carried_over(doubt.fit, rows, moved_off),
         unknown=0.0,
         last_report_m=report_m[doubt.suspect],
     )
@@ -111,27 +143,37 @@ def awake(doubt: Doubt) -> Doubt:
 def narrowed(doubt: Doubt, keep: Sequence[int]) -> tuple[tuple[Hypothesis, ...], Array, Array]:
     """The twins `keep` (indices): hypotheses, renormalised posterior [K] and states [K, V, S]."""
     p = doubt.posterior[list(keep)]
-    return tuple(doubt.twins[k] for k in keep), p / p.sum(), doubt.states[list(keep)]
+    states = doubt.of_twins()[0]
+    return tuple(doubt.estimated(k) for k in keep), p / p.sum(), states[list(keep)]
 
 
 def advanced(
-    doubt: Doubt, faults: twin.FaultArrays, frame: Frame, orders: Orders, period_s: float
+    doubt: Doubt,
+    motion: twin.FaultArrays,
+    reports: ReportFaults,
+    frame: Frame,
+    orders: Orders,
+    period_s: float,
 ) -> Doubt:
-    """As `tick`, under fault rows that may differ from those of the hypotheses."""
+    """As `tick`, under faults that may differ from those of the hypotheses."""
     suspect = doubt.suspect
-    before_m = twin.report(doubt.states, faults)[:, suspect]
-    states = _move(doubt.baseline, faults, doubt.states, suspect, frame, orders, period_s)
-    predicted_m = twin.report(states, faults)[:, suspect]
-    fit = replace(doubt.fit, path_m=doubt.fit.path_m + np.abs(predicted_m - before_m))
-    due = frame.time_s - doubt.judged_s >= diagnosis.SAMPLE_PERIOD_S - 1e-6
-    if not (due and frame.fresh[suspect]):
-        return replace(doubt, states=states, fit=fit)
+    states = _move(doubt, motion, frame, orders, period_s)
+    trail_m = np.roll(doubt.trail_m, -1, axis=0)
+    trail_m[-1] = twin.report(states, motion)[:, suspect]
+    age = np.minimum(np.round(reports.lag_s / period_s).astype(np.intp), len(trail_m) - 2)
+    rows = np.arange(len(states))
+    now_m, before_m = trail_m[-1 - age, rows], trail_m[-2 - age, rows]
+    fit = replace(doubt.fit, path_m=doubt.fit.path_m + np.abs(now_m - before_m))
+    since_s = frame.time_s - doubt.judged_s
+    if since_s < diagnosis.SAMPLE_PERIOD_S - 1e-6 or not frame.fresh[suspect]:
+        return replace(doubt, states=states, trail_m=trail_m, fit=fit)
     observed_m = frame.position_m[suspect]
     gained = diagnosis.unknown_log_likelihood(observed_m, doubt.last_report_m)
     return replace(
         doubt,
         states=states,
-        fit=diagnosis.judge(fit, observed_m, predicted_m),
+        trail_m=trail_m,
+        fit=diagnosis.judge(fit, observed_m, now_m, reports.noise_m, since_s),
         unknown=doubt.unknown + gained,
         last_report_m=observed_m,
         judged_s=frame.time_s,
@@ -139,23 +181,25 @@ def advanced(
 
 
 def _move(
-    baseline: Baseline,
-    faults: twin.FaultArrays,
-    states: Array,
-    suspect: int,
-    frame: Frame,
-    orders: Orders,
-    period_s: float,
+    doubt: Doubt, motion: twin.FaultArrays, frame: Frame, orders: Orders, period_s: float
 ) -> Array:
     moved = twin.advance(
-        baseline.model,
-        baseline.model.nominal,
-        faults,
-        states,
+        doubt.baseline.model,
+        doubt.particles.parameters,
+        motion,
+        doubt.states,
         orders.setpoints,
         orders.driven,
         period_s,
     )
-    trusted = faults.gps_stuck < 0.5
-    trusted[:, suspect] = False
-    return correct(moved.states, frame, trusted, period_s / CORRECTION_TIME_S)
+    trusted = motion.gps_stuck < 0.5
+    trusted[:, doubt.suspect] = False
+    gain = np.full((1, 1), period_s / CORRECTION_TIME_S)
+    return observer.corrected(moved.states, frame, frame.position_m, trusted, gain)
+
+
+def _log_mean_exp(values: Array) -> Array:
+    """Over the first axis."""
+    top = values.max(axis=0)
+    mean: Array = np.exp(values - top).mean(axis=0)
+    return np.asarray(top + np.log(mean))

@@ -63,14 +63,14 @@ def _twins(desk: Desk) -> tuple[TwinSnapshot, ...]:
         known = watch.baseline.known
         name = known[-1].name if known else "none"
         return (_twin(name, 1.0, 0.0, watch.state, watch.report_m, watch.sigma_m),)
-    posterior, reports, sigmas = doubt.posterior, doubt.report_m, doubt.sigma_m
-    twins = []
+    posterior, (states, reports, sigmas) = doubt.posterior, doubt.of_twins()
+    twins, weights = [], doubt.log_weights
     for k, hypothesis in enumerate(doubt.twins):
         sigma = np.zeros_like(reports[k])
         sigma[doubt.suspect] = sigmas[k]
-        weight = float(doubt.log_weights[k])
+        weight = float(weights[k])
         twins.append(
-            _twin(hypothesis.name, float(posterior[k]), weight, doubt.states[k], reports[k], sigma)
+            _twin(hypothesis.name, float(posterior[k]), weight, states[k], reports[k], sigma)
         )
     return tuple(twins)
 

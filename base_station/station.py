@@ -279,7 +279,7 @@ def own_decision(desk: Desk, frame: Frame) -> Orders:
         case Settling() as phase:
             return settle(desk, phase, frame)
         case PlanningAlpha(number=number):
-            return await_alpha(desk, number, frame)
+            return await_alpha(desk, number)
         case Experimenting() as phase:
             return experiment(desk, phase, frame)
         case Concluding() as phase:

@@ -1,8 +1,8 @@
-"""The twin that is believed, run beside the fleet: its residuals, its alarm, and its memory.
+"""The believed twin run beside the fleet: its residuals, its alarm, and its memory.
 
-An observer: each tick the twin is moved on under the orders that were sent, compared with what was
-received, and drawn towards it on the axes its hypothesis trusts. The residual is the difference
-before the drawing, in units of its predicted spread.
+Each tick the ensemble of `observer` is moved on under the orders that were sent, compared with what
+was received, and drawn towards it on the axes that are trusted. The residual is the difference from
+the nominal twin before the drawing, in units of its predicted spread.
 """
 
 from collections import deque
@@ -12,21 +12,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station import detection, twin
+from base_station import detection, observer, twin
 from base_station.execution import Orders
-from base_station.hypotheses import Hypothesis
+from base_station.hypotheses import NONE, Hypothesis
 from base_station.telemetry import Frame
+from hil.faults import Type, Unit
 from hil.scenario import StationView
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 CORRECTION_TIME_S = 1.0  # how fast the twin follows what is received
-NOISE_SIGMA_M = 0.03  # of one report after the vehicle's filter
-MOTION_ERROR = (
-    0.30  # of the motion the twin expects: one sigma of rolling resistance is 18 % of a pulse
+NOISE_SIGMA_M = 0.02  # of one report after the vehicle's filter
+SPREAD_FACTOR = (
+    2.5  # a vehicle keeps its parameters: its error is one draw, not a new one each tick
 )
-CONTACT_GAP_M = 0.15  # closer than this, vehicles or a vehicle and a wall may be touching ...
-CONTACT_SIGMA_M = 0.30  # ... and how they slide along each other is beyond the twin
+NOISY_M = 0.1  # a noisier report is followed the more slowly
 MEMORY_S = 60.0
 
 
@@ -54,33 +55,43 @@ class Baseline:
         known = twin.fault_rows(self.model, self.known)
         return twin.FaultArrays(
             rows.power * known.power.min(axis=0),
+            rows.gain * known.gain.prod(axis=0),
             np.maximum(rows.gps_stuck, known.gps_stuck.max(axis=0)),
         )
 
+    @property
+    def blind(self) -> Flags:
+        """[V, 2]: axes of which no report tells where the vehicle is: stuck, or drifting."""
+        blind = twin.fault_rows(self.model, (_nothing_more(self.model), *self.known))
+        axes = np.asarray(blind.gps_stuck.max(axis=0) > 0.5)
+        for hypothesis in self.known:
+            if hypothesis.kind == (Unit.GPS, Type.DRIFT):
+                axes[self.model.index(hypothesis.sysid)] = True
+        return axes
+
+    @property
+    def report_sigma_m(self) -> Array:
+        """[V]: how far off a report may be, beyond the usual; a late one by what is driven then."""
+        sigma_m = np.zeros(self.model.size)
+        for hypothesis in self.known:
+            if hypothesis.fault and hypothesis.kind in (
+                (Unit.GPS, Type.NOISE),
+                (Unit.GPS, Type.DELAY),
+            ):
+                sigma_m[self.model.index(hypothesis.sysid)] += hypothesis.fault.size[0]
+        return sigma_m
+
+    def corrected(self, frame: Frame) -> Frame:
+        """The frame without the constant errors that are known."""
+        position_m = frame.position_m
+        for hypothesis in self.known:
+            if hypothesis.fault and hypothesis.kind == (Unit.GPS, Type.OFFSET):
+                position_m = position_m.copy()
+                position_m[self.model.index(hypothesis.sysid)] -= hypothesis.fault.size[:2]
+        return replace(frame, position_m=position_m)
+
     def with_known(self, hypothesis: Hypothesis) -> "Baseline":
         return replace(self, known=(*self.known, hypothesis))
-
-
-def near_contact(position_m: Array, vehicles: twin.Vehicles) -> NDArray[np.bool_]:
-    """[V]: which of positions [V, 2] are within CONTACT_GAP_M of another vehicle or of a wall."""
-    radius_m, bounds_m = vehicles.radius_m, vehicles.bounds_m
-    gaps = np.linalg.norm(position_m[:, None] - position_m[None, :], axis=-1)
-    gaps = gaps - radius_m[:, None] - radius_m[None, :]
-    np.fill_diagonal(gaps, np.inf)
-    to_walls = np.hstack([position_m - bounds_m[[0, 2]], bounds_m[[1, 3]] - position_m])
-    nearest = np.minimum(gaps.min(axis=1), to_walls.min(axis=1) - radius_m)
-    return np.asarray(nearest < CONTACT_GAP_M)
-
-
-def correct(states: Array, frame: Frame, trusted: NDArray[np.bool_], gain: float) -> Array:
-    """States [H, V, S] drawn towards a frame where `trusted` [H, V, 2]; headings as received."""
-    out = states.copy()
-    position = out[..., twin.NORTH : twin.EAST + 1]
-    known = trusted & frame.fresh[None, :, None]
-    position += np.where(known, gain * (np.nan_to_num(frame.position_m) - position), 0.0)
-    yaw = np.where(np.isnan(frame.yaw_rad), out[..., twin.YAW], frame.yaw_rad)
-    out[..., twin.YAW] = yaw
-    return out
 
 
 class Watch:
@@ -88,11 +99,11 @@ class Watch:
 
     def __init__(self, view: StationView, baseline: Baseline, state: Array, time_s: float) -> None:
         self.baseline = baseline
-        self._faults = baseline.faults((_nothing_more(view),))
-        self._trusted = self._faults.gps_stuck < 0.5
+        self._faults = baseline.faults((_nothing_more(baseline.model),))
+        self._trusted, self._noise_m = ~baseline.blind, baseline.report_sigma_m[:, None]
         self._period_s = 1.0 / view.clock.telemetry_hz
-        self.state = state
-        self._model_sigma_m = np.zeros((len(view.fleet), 2))  # builds up and fades like the error
+        self._observer = observer.start(baseline.model, state)
+        self.sigma_m = np.full((len(view.fleet), 2), NOISE_SIGMA_M)  # of the residual, in metres
         self.travelled_m = [0.0] * len(view.fleet)  # by the twin, since this belief began
         self.threshold = detection.threshold(
             view.diagnosis.false_alarms_per_hour, view.clock.telemetry_hz, len(view.fleet)
@@ -103,51 +114,37 @@ class Watch:
         self.memory: deque[Moment] = deque(maxlen=round(MEMORY_S / self._period_s))
 
     @property
+    def state(self) -> Array:
+        """[V, S]: the nominal twin, where the fleet is believed to be."""
+        return np.asarray(self._observer.states[0])
+
+    @property
     def report_m(self) -> Array:
         """[V, 2]: what the believed twin expects to receive."""
         return np.asarray(twin.report(self.state[None], self._faults)[0])
 
-    @property
-    def sigma_m(self) -> Array:
-        """[V, 2]: one standard deviation of the residual before it is normalised."""
-        return np.asarray(np.hypot(NOISE_SIGMA_M, self._model_sigma_m))
-
     def tick(self, frame: Frame, orders: Orders) -> tuple[int, ...]:
         """Move on under `orders` to `frame`; indices of the vehicles whose alarm stands now."""
-        moved = twin.advance(
-            self.baseline.model,
-            self.baseline.model.nominal,
-            self._faults,
-            self.state[None],
-            orders.setpoints,
-            orders.driven,
-            self._period_s,
+        frame, before = self.baseline.corrected(frame), self.state
+        expected, impulses_ns = observer.moved(
+            self._observer, self.baseline.model, self._faults, orders, self._period_s
         )
-        self.contacts = tuple(
-            (int(a), int(b)) for a, b in np.argwhere(moved.impulses_ns[0] > 0.0) if a < b
-        )
-        before, self.state = self.state, moved.states[0]
-        steps = (self.state - before)[:, twin.NORTH : twin.EAST + 1]
-        gain = self._period_s / CORRECTION_TIME_S
-        self._model_sigma_m = self._grown_sigma(steps, gain, frame)
+        self.contacts = tuple((int(a), int(b)) for a, b in np.argwhere(impulses_ns > 0.0) if a < b)
+        steps = (expected.states[0] - before)[:, twin.NORTH : twin.EAST + 1]
         self.travelled_m = [
             m + float(np.hypot(*d)) for m, d in zip(self.travelled_m, steps, strict=True)
         ]
-        self.residual = (frame.position_m - self.report_m) / self.sigma_m
+        reports_m = twin.report(expected.states, self._faults)
+        spread_m = SPREAD_FACTOR * observer.spread_m(reports_m)
+        self.sigma_m = np.sqrt(NOISE_SIGMA_M**2 + self._noise_m**2 + spread_m**2)
+        self.residual = (frame.position_m - reports_m[0]) / self.sigma_m
         self.cusum = detection.update(self.cusum, self.residual, frame.time_s)
-        self.state = correct(moved.states, frame, self._trusted, gain)[0]
+        slowness = 1.0 + self._noise_m / NOISY_M
+        gain = self._period_s / (CORRECTION_TIME_S * slowness)
+        self._observer = observer.drawn(expected, frame, self._trusted, gain)
         self.memory.append(Moment(frame, orders, self.state))
         return tuple(int(v) for v in np.flatnonzero(self.cusum.level.max(axis=1) > self.threshold))
 
-    def _grown_sigma(self, steps_m: Array, gain: float, frame: Frame) -> Array:
-        """[V, 2]: the twin's own error after one more tick in which it moved by `steps_m`."""
-        grown = (1.0 - gain) * self._model_sigma_m + MOTION_ERROR * np.abs(steps_m)
-        believed_m = self.state[:, twin.NORTH : twin.EAST + 1]
-        seen_m = np.where(frame.fresh[:, None], frame.position_m, believed_m)
-        vehicles = self.baseline.model.vehicles
-        touching = near_contact(believed_m, vehicles) | near_contact(seen_m, vehicles)
-        return np.where(touching[:, None], np.maximum(grown, CONTACT_SIGMA_M), grown)
 
-
-def _nothing_more(view: StationView) -> Hypothesis:
-    return Hypothesis("none", view.fleet[0].sysid, 1.0)
+def _nothing_more(model: twin.FleetModel) -> Hypothesis:
+    return Hypothesis(NONE, model.sysids[0], 1.0)

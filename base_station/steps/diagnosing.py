@@ -2,10 +2,8 @@
 
 from dataclasses import asdict, replace
 
-import numpy as np
-
 from base_station import doubt as doubts
-from base_station import execution
+from base_station import escalation, execution
 from base_station.desk import Desk
 from base_station.diagnosis import Verdict
 from base_station.execution import Orders
@@ -17,8 +15,7 @@ from base_station.telemetry import Frame
 from base_station.watch import Watch
 
 EXPERIMENT_MIN_S = 1.0
-MOMENTS_PER_TICK = 15  # of the memory, each about 0.3 ms: a step must not take 10 ms
-PLANNABLE_POSTERIOR = 0.005  # explanations less likely than this are not worth a contact
+MOMENTS_PER_TICK = 4  # of the memory, each about 2 ms: a step must not take 10 ms
 
 
 def settle(desk: Desk, phase: Settling, frame: Frame) -> Orders:
@@ -31,23 +28,42 @@ def settle(desk: Desk, phase: Settling, frame: Frame) -> Orders:
     desk.doubt = doubts.anchor(opened, desk.mean_report_m())
     posterior = opened.verdict(desk.view.diagnosis.decide_at).posterior
     desk.say("hypotheses", f"{member.name}: {_shown(posterior)}", posterior=posterior)
-    desk.tries = 0
-    _conclude_or_plan(desk, conclusive=opened.verdict(desk.view.diagnosis.decide_at).decided)
+    desk.tries, desk.soloed = 0, False
+    _escalate(desk, named=opened.verdict(desk.view.diagnosis.decide_at).decided)
     return desk.hold()
 
 
+def _escalate(desk: Desk, named: bool) -> None:
+    """Conclude when that is due; else the suspect alone, then contact, then give up.
+
+    `named`: the evidence of the last experiment named one explanation.
+    """
+    doubt, diagnosis = desk.open_doubt, desk.view.diagnosis
+    best = doubt.verdict(diagnosis.decide_at)
+    if best.hypothesis == UNKNOWN and best.decided and (desk.soloed or desk.tries):
+        _give_up(desk, "no explanation that is known fits")
+    elif named and best.hypothesis != UNKNOWN:
+        _believe(desk, best)
+    elif not desk.soloed and (plan := escalation.solo(doubt, desk.view)) is not None:
+        desk.soloed = True
+        _begin(desk, plan, "plan alpha: the suspect alone, there and back on each axis")
+    elif best.hypothesis != UNKNOWN and escalation.remedy_posterior(doubt) >= diagnosis.decide_at:
+        _believe(desk, best)
+    elif desk.tries < diagnosis.tries:
+        _request_alpha(desk)
+    else:
+        _give_up(desk, f"not after {desk.tries} experiments")
+
+
 def _request_alpha(desk: Desk) -> None:
-    doubt = desk.open_doubt
-    p = doubt.posterior[: len(doubt.twins)]
-    keep = [k for k in range(len(p)) if p[k] >= PLANNABLE_POSTERIOR]
-    if len(keep) < 2:
-        keep = sorted(np.argsort(p)[-2:].tolist())
-    hypotheses, posterior, states = doubts.narrowed(doubt, keep)
+    hypotheses, posterior, states = doubts.narrowed(
+        desk.open_doubt, escalation.for_contact(desk.open_doubt)
+    )
     number = desk.ask("alpha", hypotheses, tuple(float(x) for x in posterior), states)
     desk.enter(PlanningAlpha(number))
 
 
-def await_alpha(desk: Desk, number: int, frame: Frame) -> Orders:
+def await_alpha(desk: Desk, number: int) -> Orders:
     """[1] The fleet holds until the planner has answered."""
     answer = desk.answers.pop(number, None)
     if answer is None:
@@ -55,10 +71,15 @@ def await_alpha(desk: Desk, number: int, frame: Frame) -> Orders:
     if answer.plan is None:
         desk.stop("cannot tell: no manoeuvre found that tells the hypotheses apart")
         return desk.hold()
-    desk.doubt = doubts.anchor(doubts.awake(desk.open_doubt), desk.mean_report_m())
-    desk.say("plan", announced(answer.plan), **_foretold(answer.plan))
-    desk.enter(Experimenting(answer.plan, frame.time_s))
+    desk.tries += 1
+    _begin(desk, answer.plan, announced(answer.plan), **_foretold(answer.plan))
     return desk.hold()
+
+
+def _begin(desk: Desk, plan: OpenLoopPlan, text: str, **data: object) -> None:
+    desk.doubt = doubts.anchor(doubts.awake(desk.open_doubt), desk.mean_report_m())
+    desk.say("plan", text, **data)
+    desk.enter(Experimenting(plan, desk.time_s))
 
 
 def announced(plan: OpenLoopPlan) -> str:
@@ -98,49 +119,38 @@ def experiment(desk: Desk, phase: Experimenting, frame: Frame) -> Orders:
 def conclude(desk: Desk, phase: Concluding, frame: Frame) -> Orders:
     """[2] At rest: the verdict, or another plan from where each twin stands now."""
     if frame.time_s - phase.since_s >= execution.REST_S:
-        decided = desk.open_doubt.verdict(desk.view.diagnosis.decide_at).decided
-        desk.tries += 1
+        named = desk.open_doubt.verdict(desk.view.diagnosis.decide_at).decided
         desk.doubt = doubts.anchor(desk.open_doubt, desk.mean_report_m())
-        _conclude_or_plan(desk, conclusive=decided)
+        _escalate(desk, named)
     return desk.hold()
 
 
-def _conclude_or_plan(desk: Desk, conclusive: bool) -> None:
-    verdict = desk.open_doubt.verdict(desk.view.diagnosis.decide_at)
-    conclusive = conclusive and verdict.hypothesis != UNKNOWN
-    if not conclusive and desk.tries < desk.view.diagnosis.tries:
-        _request_alpha(desk)
-        return
-    desk.verdict = replace(verdict, decided=conclusive)
+def _give_up(desk: Desk, why: str) -> None:
+    best = desk.open_doubt.verdict(desk.view.diagnosis.decide_at)
+    desk.verdict = replace(best, decided=False)
     name = desk.view.fleet[desk.open_doubt.suspect].name
-    if not conclusive:
-        desk.say(
-            "verdict",
-            f"{name}: cannot tell ({_shown(verdict.posterior)})",
-            **_told(desk.verdict),
-        )
-        desk.stop("cannot tell")
-        return
-    desk.say(
-        "verdict",
-        f"{name}: {verdict.hypothesis} ({_shown(verdict.posterior)})",
-        **_told(desk.verdict),
-    )
-    _believe(desk, verdict.hypothesis)
-    request_beta(desk)
+    text = f"{name}: cannot tell: {why} ({_shown(best.posterior)})"
+    desk.say("verdict", text, **_told(desk.verdict))
+    desk.stop("cannot tell")
 
 
-def _believe(desk: Desk, name: str) -> None:
+def _believe(desk: Desk, verdict: Verdict) -> None:
     """From now on the fleet is watched under the verdict; the doubt is closed."""
-    index = [h.name for h in desk.open_doubt.twins].index(name)
-    baseline = desk.open_doubt.baseline
-    if name != NONE:
-        baseline = baseline.with_known(desk.open_doubt.twins[index])
-    memory = desk.watch.memory
-    desk.watch = Watch(desk.view, baseline, desk.open_doubt.states[index], desk.time_s)
+    doubt = desk.open_doubt
+    desk.verdict = replace(verdict, decided=True)
+    name = desk.view.fleet[doubt.suspect].name
+    text = f"{name}: {verdict.hypothesis} ({_shown(verdict.posterior)})"
+    desk.say("verdict", text, **_told(desk.verdict))
+    index = [h.name for h in doubt.twins].index(verdict.hypothesis)
+    baseline = doubt.baseline
+    if verdict.hypothesis != NONE:
+        baseline = baseline.with_known(doubt.estimated(index))
+    memory, states = desk.watch.memory, doubt.of_twins()[0]
+    desk.watch = Watch(desk.view, baseline, states[index], desk.time_s)
     desk.watch.memory.extend(memory)
     desk.doubt = None
     desk.alarmed.clear()
+    request_beta(desk)
 
 
 def _shown(posterior: dict[str, float]) -> str:

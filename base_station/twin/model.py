@@ -57,6 +57,7 @@ class FaultArrays(NamedTuple):
     """Hypotheses as flags; batch row b is under hypothesis b % H."""
 
     power: Array  # [H, V, M] 1: the motor pulls; 0: its wheel runs free
+    gain: Array  # [H, V, M] of its output; a weak motor still brakes like a sound one
     gps_stuck: Array  # [H, V, 2] 1: the NED axis (north, east) is frozen
 
 
@@ -166,7 +167,7 @@ def perturbed(
 def fault_rows(model: FleetModel, hypotheses: Sequence[Hypothesis]) -> FaultArrays:
     """Each hypothesis as flags. Raises ValueError for one that has no twin."""
     shape = (len(hypotheses), *model.nominal.stall_force_n.shape[1:])
-    power = np.ones(shape)
+    power, gain = np.ones(shape), np.ones(shape)
     stuck = np.zeros((*shape[:2], 2))
     for h, hypothesis in enumerate(hypotheses):
         if not hypothesis.has_twin:
@@ -174,14 +175,19 @@ def fault_rows(model: FleetModel, hypotheses: Sequence[Hypothesis]) -> FaultArra
         fault, v = hypothesis.fault, model.index(hypothesis.sysid)
         if fault is None:
             continue
+        motors = [i - 1 for i in fault.instances] or slice(None)
         if (fault.unit, fault.type) == (Unit.MOTOR, Type.OFF):
-            power[h, v, [i - 1 for i in fault.instances] or slice(None)] = 0.0
+            power[h, v, motors] = 0.0
+        elif (fault.unit, fault.type) == (Unit.MOTOR, Type.PARTIAL):
+            gain[h, v, motors] = fault.size[0]
+        elif (fault.unit, fault.type) == (Unit.MOTOR, Type.REVERSED):
+            gain[h, v, motors] = -1.0
         elif (fault.unit, fault.type) == (Unit.GPS, Type.STUCK):
             for k, axis in enumerate(NED_AXES[:2]):
                 stuck[h, v, k] = float(not fault.axes or axis in fault.axes)
-        else:
+        elif fault.unit is not Unit.GPS:  # other GPS faults change reports, not how it drives
             raise ValueError(f"hypothesis {hypothesis.name!r}: no twin for {fault}")
-    return FaultArrays(power, stuck)
+    return FaultArrays(power, gain, stuck)
 
 
 def _bounds_m(area: Rectangle) -> Array:
