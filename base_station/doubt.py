@@ -21,6 +21,7 @@ from hil.faults import Type, Unit
 
 Array = NDArray[np.float64]
 
+ACROSS = 0.3  # share of a motion that makes the other axis uncertain, too
 FLOOR = 1e-3  # 'something else' is never ruled out before an experiment
 
 
@@ -163,7 +164,8 @@ def advanced(
     age = np.minimum(np.round(reports.lag_s / period_s).astype(np.intp), len(trail_m) - 2)
     rows = np.arange(len(states))
     now_m, before_m = trail_m[-1 - age, rows], trail_m[-2 - age, rows]
-    fit = replace(doubt.fit, path_m=doubt.fit.path_m + np.abs(now_m - before_m))
+    across_m = _across(doubt.states, states, suspect) * (motion.gps_stuck[:, suspect] < 0.5)
+    fit = replace(doubt.fit, path_m=doubt.fit.path_m + np.abs(now_m - before_m) + across_m)
     since_s = frame.time_s - doubt.judged_s
     if since_s < diagnosis.SAMPLE_PERIOD_S - 1e-6 or not frame.fresh[suspect]:
         return replace(doubt, states=states, trail_m=trail_m, fit=fit)
@@ -178,6 +180,12 @@ def advanced(
         last_report_m=observed_m,
         judged_s=frame.time_s,
     )
+
+
+def _across(before: Array, after: Array, suspect: int) -> Array:
+    """[R, 2] what motion along one axis may do to the other: friction holds what moves less."""
+    axes = slice(twin.NORTH, twin.EAST + 1)
+    return ACROSS * np.abs(after[:, suspect, axes] - before[:, suspect, axes])[:, ::-1]
 
 
 def _move(

@@ -81,7 +81,7 @@ def _spread_out(values: Array, twins: int, rng: np.random.Generator) -> Array:
     """Rows [K x T, ...] shrunk towards the mean of their twin, and moved at random by as much."""
     by_twin = values.reshape(DRAWS, twins, *values.shape[1:])
     mean, sigma = by_twin.mean(axis=0), by_twin.std(axis=0)
-    noise = sigma * rng.standard_normal(by_twin.shape)
+    noise = sigma * rng.standard_normal((DRAWS, 1, *values.shape[1:]))  # alike for all twins
     moved = mean + SHRINKAGE * (by_twin - mean) + np.sqrt(1.0 - SHRINKAGE**2) * noise
     return np.asarray(np.maximum(moved, 0.0).reshape(values.shape))
 
