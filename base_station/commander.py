@@ -9,7 +9,7 @@ from base_station.telemetry import Status, Track
 from hil.mavlink import stick
 from hil.scenario import StationView
 
-REPEAT_S = 0.5
+REPEAT_S = 0.2
 STICK_US = 100
 SURE_BEATS = 2
 TAKEOVER_S = 2.5  # longer than two heartbeats: a late one must not look like a takeover

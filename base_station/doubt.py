@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station import diagnosis, observer, particles, twin
+from base_station import diagnosis, hearing, observer, particles, twin
 from base_station.diagnosis import Fit, ReportFaults, Verdict
 from base_station.execution import Orders
+from base_station.hearing import Hearing
 from base_station.hypotheses import Hypothesis
 from base_station.particles import DRAWS, Particles
 from base_station.telemetry import Frame
@@ -40,6 +41,7 @@ class Doubt:
     prior: Array
     states: Array
     trail_m: Array
+    hearing: Hearing
     fit: Fit
     unknown: float
     last_report_m: Array
@@ -158,7 +160,8 @@ def advanced(
 ) -> Doubt:
     """As `tick`, under faults that may differ from those of the hypotheses."""
     suspect = doubt.suspect
-    states = _move(doubt, motion, frame, orders, period_s)
+    heard = hearing.heard(doubt.hearing, orders, frame, period_s)
+    states = _move(doubt, motion, frame, heard, period_s)
     trail_m = np.roll(doubt.trail_m, -1, axis=0)
     trail_m[-1] = twin.report(states, motion)[:, suspect]
     age = np.minimum(np.round(reports.lag_s / period_s).astype(np.intp), len(trail_m) - 2)
@@ -168,13 +171,14 @@ def advanced(
     fit = replace(doubt.fit, path_m=doubt.fit.path_m + np.abs(now_m - before_m) + across_m)
     since_s = frame.time_s - doubt.judged_s
     if since_s < diagnosis.SAMPLE_PERIOD_S - 1e-6 or not frame.fresh[suspect]:
-        return replace(doubt, states=states, trail_m=trail_m, fit=fit)
+        return replace(doubt, states=states, trail_m=trail_m, hearing=heard, fit=fit)
     observed_m = frame.position_m[suspect]
     gained = diagnosis.unknown_log_likelihood(observed_m, doubt.last_report_m)
     return replace(
         doubt,
         states=states,
         trail_m=trail_m,
+        hearing=heard,
         fit=diagnosis.judge(fit, observed_m, now_m, reports.noise_m, since_s),
         unknown=doubt.unknown + gained,
         last_report_m=observed_m,
@@ -189,15 +193,14 @@ def _across(before: Array, after: Array, suspect: int) -> Array:
 
 
 def _move(
-    doubt: Doubt, motion: twin.FaultArrays, frame: Frame, orders: Orders, period_s: float
+    doubt: Doubt, motion: twin.FaultArrays, frame: Frame, heard: Hearing, period_s: float
 ) -> Array:
     moved = twin.advance(
         doubt.baseline.model,
         doubt.particles.parameters,
         motion,
         doubt.states,
-        orders.setpoints,
-        orders.driven,
+        *heard.of_rows(len(doubt.states)),
         period_s,
     )
     trusted = motion.gps_stuck < 0.5

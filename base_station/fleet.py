@@ -84,7 +84,9 @@ class Fleet:
         """
         frames: list[Frame] = []
         while self._is_due(self._next_tick * self.period_s):
-            frames.append(frame_at(self.tracks, self._next_tick * self.period_s))
+            delays_s = [self._clock.delay_s(m.sysid) for m in self.view.fleet]
+            time_s = self._next_tick * self.period_s
+            frames.append(frame_at(self.tracks, time_s, self.period_s, delays_s))
             self._next_tick += 1
             if len(frames) == round(LONG_GAP_S / self.period_s):
                 newest = int((self.newest_s + 1e-3) / self.period_s)

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station import diagnosis, particles, twin
+from base_station import diagnosis, hearing, particles, twin
 from base_station.diagnosis import ReportFaults
 from base_station.doubt import Doubt, advanced
 from base_station.hypotheses import NONE, Hypothesis
@@ -40,6 +40,7 @@ class Hindsight:
         times = np.array([m.frame.time_s for m in memory])
         start = int(np.searchsorted(times, between_s[0] - ONSET_MARGIN_S)) - 1
         first = memory[max(0, start)]
+        sent = tuple(m.orders for m in memory[: max(0, start) + 1])
         rng = np.random.default_rng(round(between_s[1] * 1000))
         drawn = particles.draw(baseline, twins, rng)
         rows = particles.DRAWS * len(twins)
@@ -59,6 +60,7 @@ class Hindsight:
             prior=np.log([h.prior for h in hypotheses]),
             states=states,
             trail_m=np.repeat(there_m[None], round(TRAIL_S / period_s), axis=0),
+            hearing=hearing.nothing_yet(particles.DRAWS, baseline.model.size, sent),
             fit=diagnosis.fresh_fit(rows),
             unknown=0.0,
             last_report_m=np.asarray(first.frame.position_m[suspect]),

@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station import twin
+from base_station import hearing, twin
 from base_station.execution import Orders
+from base_station.hearing import Hearing
 from base_station.telemetry import Frame
 
 Array = NDArray[np.float64]
@@ -25,11 +26,15 @@ DRAW = 0  # the ensemble is a set of test points, not an experiment: the same on
 
 @dataclass(frozen=True, eq=False)
 class Observer:
-    """M members: `parameters` (P = M), `report_error_m` [M, V, 2], `states` [M, V, S]."""
+    """M members: `parameters` (P = M), `report_error_m` [M, V, 2], `states` [M, V, S].
+
+    Each has heard of the orders what its link let through.
+    """
 
     parameters: twin.Parameters
     report_error_m: Array
     states: Array
+    hearing: Hearing
 
 
 def start(model: twin.FleetModel, state: Array) -> Observer:
@@ -40,7 +45,8 @@ def start(model: twin.FleetModel, state: Array) -> Observer:
         draws[0] = nominal[0]
     error_m = REPORT_ERROR_M * rng.standard_normal((MEMBERS, model.size, 2))
     error_m[0] = 0.0
-    return Observer(drawn, error_m, np.repeat(state[None], MEMBERS, axis=0))
+    heard = hearing.nothing_yet(MEMBERS, model.size)
+    return Observer(drawn, error_m, np.repeat(state[None], MEMBERS, axis=0), heard)
 
 
 def moved(
@@ -48,14 +54,16 @@ def moved(
     model: twin.FleetModel,
     faults: twin.FaultArrays,
     orders: Orders,
+    frame: Frame,
     period_s: float,
 ) -> tuple[Observer, Array]:
-    """Every member after one more period under `orders`; impulses [V, V] (N s) of member 0."""
-    setpoints, driven = orders.setpoints, orders.driven
+    """Every member after one more period, to `frame`; impulses [V, V] (N s) of member 0."""
+    heard = hearing.heard(observer.hearing, orders, frame, period_s)
+    setpoints, driven = heard.of_rows(MEMBERS)
     after = twin.advance(
         model, observer.parameters, faults, observer.states, setpoints, driven, period_s
     )
-    return replace(observer, states=after.states), after.impulses_ns[0]
+    return replace(observer, states=after.states, hearing=heard), after.impulses_ns[0]
 
 
 def spread_m(reports_m: Array) -> Array:

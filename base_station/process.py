@@ -211,10 +211,9 @@ def _compile_twin(view: StationView) -> None:
     goals = [[m.goal.north_m, m.goal.east_m] for m in view.fleet]
     state = twin.initial_state(goals, [0.0] * len(goals))
     watch = Watch(view, Baseline(twin.FleetModel.from_view(view)), state, 0.0)
-    watch.tick(
-        Frame(0.0, state[:, :2], state[:, 3:5], state[:, 2], np.ones(len(goals), dtype=np.bool_)),
-        hold(len(goals)),
-    )
+    still, fresh = np.zeros((len(goals), 2)), np.ones(len(goals), dtype=np.bool_)
+    none = np.zeros(len(goals))
+    watch.tick(Frame(0.0, still, still, none, fresh, none, none), hold(len(goals)))
 
 
 def _say_json(line: dict[str, Any]) -> None:

@@ -1,6 +1,7 @@
 """What has been received: per-vehicle history, and the fleet on a common time base."""
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +14,7 @@ Array = NDArray[np.float64]
 
 MAX_AGE_S = 0.35  # older than this a sample is not carried forward to a frame
 HISTORY = 64
+LOSS_WINDOW_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,8 @@ class Frame:
     velocity_mps: Array  # [V, 2]
     yaw_rad: Array  # [V]
     fresh: NDArray[np.bool_]  # [V]
+    loss: Array  # [V] share of reports that got lost lately
+    delay_s: Array  # [V] of the link, one way
 
 
 class Track:
@@ -80,6 +84,13 @@ class Track:
                     ),
                 )
         return None
+
+    def loss(self, time_s: float, period_s: float) -> float:
+        """Share of the reports of the last LOSS_WINDOW_S before `time_s` that are missing."""
+        since_s = max(time_s - LOSS_WINDOW_S, self.samples[0].time_s if self.samples else time_s)
+        due = round((time_s - since_s) / period_s)
+        came = sum(since_s + 1e-3 < s.time_s <= time_s + 1e-3 for s in self.samples)
+        return max(0.0, 1.0 - came / due) if due else 0.0
 
     def newest_s(self) -> float:
         return self.samples[-1].time_s if self.samples else float("-inf")
@@ -111,7 +122,9 @@ def note(status: Status, value: object, motors: int) -> Status:
             return status
 
 
-def frame_at(tracks: list[Track], time_s: float) -> Frame:
+def frame_at(
+    tracks: list[Track], time_s: float, period_s: float, delays_s: Sequence[float]
+) -> Frame:
     """The whole fleet at `time_s`, each vehicle from its newest sample by then."""
     rows = [t.at(time_s) for t in tracks]
     nan2 = (float("nan"), float("nan"))
@@ -121,4 +134,6 @@ def frame_at(tracks: list[Track], time_s: float) -> Frame:
         np.array([r.velocity_mps if r else nan2 for r in rows]),
         np.array([t.status.yaw_rad for t in tracks]),
         np.array([r is not None for r in rows]),
+        np.array([t.loss(time_s, period_s) for t in tracks]),
+        np.array(delays_s),
     )

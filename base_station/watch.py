@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 CORRECTION_TIME_S = 1.0  # how fast the twin follows what is received
-NOISE_SIGMA_M = 0.02  # of one report after the vehicle's filter
+NOISE_SIGMA_M = 0.03  # of one report after the vehicle's filter
 SPREAD_FACTOR = (
     2.5  # a vehicle keeps its parameters: its error is one draw, not a new one each tick
 )
@@ -127,7 +127,7 @@ class Watch:
         """Move on under `orders` to `frame`; indices of the vehicles whose alarm stands now."""
         frame, before = self.baseline.corrected(frame), self.state
         expected, impulses_ns = observer.moved(
-            self._observer, self.baseline.model, self._faults, orders, self._period_s
+            self._observer, self.baseline.model, self._faults, orders, frame, self._period_s
         )
         self.contacts = tuple((int(a), int(b)) for a, b in np.argwhere(impulses_ns > 0.0) if a < b)
         steps = (expected.states[0] - before)[:, twin.NORTH : twin.EAST + 1]
