@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 CORRECTION_TIME_S = 1.0  # how fast the twin follows what is received
-NOISE_SIGMA_M = 0.03  # of one report after the vehicle's filter
+NOISE_SIGMA_M = 0.02  # of one report after the vehicle's filter
 SPREAD_FACTOR = (
     2.5  # a vehicle keeps its parameters: its error is one draw, not a new one each tick
 )
@@ -135,7 +135,9 @@ class Watch:
             m + float(np.hypot(*d)) for m, d in zip(self.travelled_m, steps, strict=True)
         ]
         reports_m = twin.report(expected.states, self._faults)
-        spread_m = SPREAD_FACTOR * observer.spread_m(reports_m)
+        # a wall pins all members, but not the slow error of the reports
+        slow_m = np.maximum(observer.spread_m(reports_m), observer.REPORT_ERROR_M)
+        spread_m = SPREAD_FACTOR * slow_m
         self.sigma_m = np.sqrt(NOISE_SIGMA_M**2 + self._noise_m**2 + spread_m**2)
         self.residual = (frame.position_m - reports_m[0]) / self.sigma_m
         self.cusum = detection.update(self.cusum, self.residual, frame.time_s)
