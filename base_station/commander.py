@@ -9,7 +9,8 @@ from base_station.telemetry import Status, Track
 from hil.mavlink import stick
 from hil.scenario import StationView
 
-REPEAT_S = 0.2
+ARM_REPEAT_S = 0.5
+REPEAT_S = 0.2  # of a mode: until it has been taken, a vehicle does something else
 STICK_US = 100
 SURE_BEATS = 2
 TAKEOVER_S = 2.5  # longer than two heartbeats: a late one must not look like a takeover
@@ -42,7 +43,7 @@ class Commander:
         """Arming for those that are not armed yet."""
         commands: list[Command] = []
         for i, (member, track) in enumerate(zip(self._view.fleet, tracks, strict=True)):
-            if not track.status.armed and time_s - self._arm_sent_s[i] >= REPEAT_S:
+            if not track.status.armed and time_s - self._arm_sent_s[i] >= ARM_REPEAT_S:
                 self._arm_sent_s[i] = time_s
                 commands.append(Arm(member.sysid))
         return commands

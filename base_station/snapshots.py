@@ -11,6 +11,8 @@ from base_station.telemetry import Frame
 
 Array = NDArray[np.float64]
 
+SHOWN = 1e-3  # explanations less likely than this are nobody's business
+
 
 def snapshot(desk: Desk, frame: Frame) -> Snapshot:
     """Everything the station knows and believes at `frame`."""
@@ -66,6 +68,8 @@ def _twins(desk: Desk) -> tuple[TwinSnapshot, ...]:
     posterior, (states, reports, sigmas) = doubt.posterior, doubt.of_twins()
     twins, weights = [], doubt.log_weights
     for k, hypothesis in enumerate(doubt.twins):
+        if posterior[k] < SHOWN:
+            continue
         sigma = np.zeros_like(reports[k])
         sigma[doubt.suspect] = sigmas[k]
         weight = float(weights[k])
