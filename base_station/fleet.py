@@ -84,8 +84,9 @@ class Fleet:
         """
         frames: list[Frame] = []
         while self._is_due(self._next_tick * self.period_s):
-            delays_s = [self._clock.delay_s(m.sysid) for m in self.view.fleet]
             time_s = self._next_tick * self.period_s
+            waited_s = self.newest_s - time_s
+            delays_s = [waited_s + self._clock.round_trip_s(m.sysid) for m in self.view.fleet]
             frames.append(frame_at(self.tracks, time_s, self.period_s, delays_s))
             self._next_tick += 1
             if len(frames) == round(LONG_GAP_S / self.period_s):

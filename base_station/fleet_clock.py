@@ -45,14 +45,14 @@ class FleetClock:
         for old in sorted(self._open)[:-KEPT_ROUNDS]:
             del self._open[old]
 
-    def delay_s(self, sysid: int) -> float:
-        """Half of a vehicle's usual round trip, in its own time, which may run faster than ours."""
+    def round_trip_s(self, sysid: int) -> float:
+        """A vehicle's usual round trip, in its own time, which may run faster than ours."""
         heard = self._heard[sysid]
         if len(heard) < 2:
             return 0.0
         (first_ns, first), (last_ns, last) = heard[0], heard[-1]
         pace = (last.boot_ns - first.boot_ns) / max(last_ns - first_ns, 1)
-        return 0.5e-9 * pace * median(reply.round_trip_ns for _, reply in heard)
+        return 1e-9 * pace * median(reply.round_trip_ns for _, reply in heard)
 
     def fleet_time_s(self, sysid: int, boot_s: float) -> float:
         """A vehicle's own time as fleet time; as it is while nothing is known of its offset."""

@@ -10,18 +10,13 @@ starts anew, and the mission goes on where it was. So a jump in time does not lo
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from base_station import detection, execution, twin
+from base_station import execution
 from base_station.desk import Desk
 from base_station.execution import Orders
-from base_station.hypotheses import nominal
 from base_station.phases import AnyPhase, Concluding, Experimenting, OnMission, Probing
 from base_station.steps.travelling import plan_from_here
 from base_station.telemetry import Frame
-from base_station.watch import correct
-
-Array = NDArray[np.float64]
 
 GAP_S = 1.0  # of fleet time without reports
 SETPOINT_KEPT_S = 3.0  # an autopilot forgets a set-point that is older (ArduPilot: GUIDED)
@@ -75,26 +70,10 @@ def bridge(desk: Desk, gap: Gap, frame: Frame) -> None:
         desk.suspect_the_worst()
     else:
         desk.phase = _resumed(desk, gap, frame.time_s)
-    _anchor(desk, frame)
+    desk.watch.restart(replace(frame, position_m=desk.mean_report_m()))
     if isinstance(desk.phase, OnMission):
         desk.mission_plans -= 1  # the one that was cut short does not count
         plan_from_here(desk)
-
-
-def _anchor(desk: Desk, frame: Frame) -> None:
-    watch = desk.watch
-    nothing_more = nominal(desk.view.fleet[0].sysid)
-    trusted = watch.baseline.faults((nothing_more,)).gps_stuck < 0.5
-    at_rest = replace(frame, position_m=desk.mean_report_m())
-    watch.state = _rested(correct(watch.state[None], at_rest, trusted, 1.0)[0])
-    watch.cusum = detection.start(len(frame.fresh), frame.time_s)
-
-
-def _rested(state: Array) -> Array:
-    out = state.copy()
-    for column in (twin.V_NORTH, twin.V_EAST, twin.YAW_RATE, twin.I_X, twin.I_Y):
-        out[..., column] = 0.0
-    return out
 
 
 def _resumed(desk: Desk, gap: Gap, now_s: float) -> AnyPhase:

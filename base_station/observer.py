@@ -77,6 +77,14 @@ def drawn(observer: Observer, frame: Frame, trusted: Flags, gain: Array) -> Obse
     return replace(observer, states=corrected(observer.states, frame, seen_m, trusted[None], gain))
 
 
+def at_rest(observer: Observer, frame: Frame, trusted: Flags) -> Observer:
+    """All members where `frame` sees the fleet, where `trusted` [V, 2], and standing."""
+    there = drawn(observer, frame, trusted, np.ones((1, 1)))
+    for column in (twin.V_NORTH, twin.V_EAST, twin.YAW_RATE, twin.I_X, twin.I_Y):
+        there.states[..., column] = 0.0
+    return replace(there, hearing=hearing.nothing_yet(MEMBERS, len(frame.fresh)))
+
+
 def corrected(states: Array, frame: Frame, seen_m: Array, trusted: Flags, gain: Array) -> Array:
     """States [R, V, S] drawn towards positions `seen_m` [..., V, 2] where `trusted` [R or 1, V, 2].
 

@@ -54,7 +54,7 @@ class Frame:
     yaw_rad: Array  # [V]
     fresh: NDArray[np.bool_]  # [V]
     loss: Array  # [V] share of reports that got lost lately
-    delay_s: Array  # [V] of the link, one way
+    delay_s: Array  # [V] from here until orders that answer it take effect
 
 
 class Track:

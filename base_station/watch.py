@@ -147,6 +147,11 @@ class Watch:
         self.memory.append(Moment(frame, orders, self.state))
         return tuple(int(v) for v in np.flatnonzero(self.cusum.level.max(axis=1) > self.threshold))
 
+    def restart(self, at_rest: Frame) -> None:
+        """After a gap: all stand where they are seen, as far as that is trusted."""
+        self._observer = observer.at_rest(self._observer, at_rest, self._trusted)
+        self.cusum = detection.start(len(at_rest.fresh), at_rest.time_s)
+
 
 def _nothing_more(model: twin.FleetModel) -> Hypothesis:
     return Hypothesis(NONE, model.sysids[0], 1.0)

@@ -30,7 +30,7 @@ LOSS = COS + 12  # speed lost to rolling resistance per step, m/s
 SIDE_LOSS = COS + 13  # the same for side grip
 YAW_LOSS = COS + 14  # and scrub, rad/s
 STUCK = COS + 15  # 2 columns: the GPS axis (north, east) is frozen
-PULL = COS + 17  # of one motor while they are gathered: stall force and ...
+PULL = COS + 17  # of one motor while they are gathered: stall force, weak or reversed, and ...
 SLOWING = COS + 18  # ... stall force over free speed
 GIVE = COS + 19  # 9 columns
 DAMP = GIVE + 9  # 9 columns
@@ -84,7 +84,7 @@ def gather_motor(
     for lane in range(tile.shape[2]):
         p, h = draw[lane], hypothesis[lane]
         pull = parameters.stall_force_n[p, v, m] * faults.power[h, v, m]
-        tile[v, PULL, lane] = pull
+        tile[v, PULL, lane] = pull * faults.gain[h, v, m]
         tile[v, SLOWING, lane] = pull / parameters.free_speed_mps[p, v, m]
     for i in range(3):
         row = jacobian(vehicles, v, m, i)
