@@ -12,6 +12,7 @@ from hil.scenario import StationView
 ARM_REPEAT_S = 0.5
 REPEAT_S = 0.2  # of a mode: until it has been taken, a vehicle does something else
 STICK_US = 100
+SURE = 0.7  # of the round trip: it varies
 SURE_BEATS = 2
 TAKEOVER_S = 2.5  # longer than two heartbeats: a late one must not look like a takeover
 
@@ -22,6 +23,7 @@ class _Sent:
 
     mode: int | None = None
     time_s: float = float("-inf")
+    asked_s: float = float("-inf")  # the first time
     confirmed: bool = False
     obeyed: bool = False  # it has been in a mode of ours
     was_armed: bool = False
@@ -48,8 +50,14 @@ class Commander:
                 commands.append(Arm(member.sysid))
         return commands
 
-    def mode_asked(self, index: int) -> int | None:
-        return self._sent[index].mode
+    def acknowledged(self, index: int, track: Track, time_s: float) -> int | None:
+        """A vehicle took a change of mode: to which; None if it can't be the last one asked for.
+
+        An answer does not say what it answers, but none comes faster than the round trip.
+        """
+        sent, tick_s = self._sent[index], 1.0 / self._view.clock.telemetry_hz
+        soon = time_s - sent.asked_s < SURE * track.round_trip_s - tick_s
+        return None if soon else sent.mode
 
     def carry_out(self, orders: Orders, tracks: list[Track], time_s: float) -> list[Command]:
         """Mode changes where the mode is not what it should be, and set-points where driven."""
@@ -60,7 +68,7 @@ class Commander:
             driven = bool(orders.driven[i])
             if self._is_strayed(i, driven, tracks[i].status, time_s):
                 continue
-            commands += self._mode(i, member.sysid, driven, tracks[i].status, time_s)
+            commands += self._mode(i, member.sysid, driven, tracks[i], time_s)
             if driven or self.autopilots[i].needs_setpoints_first:
                 north, east, yaw = (float(x) for x in orders.setpoints[i])
                 heading = None if yaw != yaw else yaw
@@ -68,18 +76,23 @@ class Commander:
         return commands
 
     def _mode(
-        self, index: int, sysid: int, driven: bool, status: Status, time_s: float
+        self, index: int, sysid: int, driven: bool, track: Track, time_s: float
     ) -> list[Command]:
-        autopilot = self.autopilots[index]
+        autopilot, status = self.autopilots[index], track.status
         wanted = autopilot.driven_mode if driven else autopilot.hold_mode
         sent = self._sent[index]
         changed = sent.mode != wanted
         if status.mode == wanted and not changed:
-            self._sent[index] = replace(sent, confirmed=True)
+            if status.mode_beats >= SURE_BEATS:
+                self._sent[index] = replace(sent, confirmed=True)
             return []
-        if not changed and (sent.confirmed or time_s - sent.time_s < REPEAT_S):
+        repeat_s = max(REPEAT_S, 1.5 * track.round_trip_s)
+        if not changed and (sent.confirmed or time_s - sent.time_s < repeat_s):
             return []  # one that was in it and has left is not argued with
-        self._sent[index] = replace(sent, mode=wanted, time_s=time_s, confirmed=False)
+        asked_s = time_s if changed else sent.asked_s
+        self._sent[index] = replace(
+            sent, mode=wanted, time_s=time_s, asked_s=asked_s, confirmed=False
+        )
         return [SetMode(sysid, wanted)]
 
     def _is_strayed(self, index: int, driven: bool, status: Status, time_s: float) -> bool:

@@ -39,7 +39,7 @@ class Fleet:
             return
         track.last_heard_wall_s = wall_s
         value = message.value
-        track.status = note(track.status, value, len(member.frame.motors))
+        track.said(note(track.status, value, len(member.frame.motors)))
         origin = self._origins[index]
         if origin is not None:
             origin.hear(value)
@@ -51,6 +51,7 @@ class Fleet:
             track.position(Sample(time_s, (north, east), (v_north, v_east)))
         elif isinstance(value, mavlink.Timesync) and value.tc1_ns:
             self._clock.reply(member.sysid, value.tc1_ns, value.ts1_ns, int(wall_s * 1e9))
+            track.round_trip_s = self._clock.round_trip_s(member.sysid)
 
     def fleet_time_s(self, index: int, boot_s: float) -> float:
         """A vehicle's own time as fleet time."""
@@ -59,7 +60,7 @@ class Fleet:
     def mode_acknowledged(self, index: int, mode: int) -> None:
         """The vehicle said that it is in `mode` now, before its next heartbeat does."""
         track = self.tracks[index]
-        track.status = replace(track.status, mode=mode, mode_beats=0)
+        track.said(replace(track.status, mode=mode, mode_beats=0))
 
     @property
     def newest_s(self) -> float:
@@ -86,8 +87,10 @@ class Fleet:
         while self._is_due(self._next_tick * self.period_s):
             time_s = self._next_tick * self.period_s
             waited_s = self.newest_s - time_s
-            delays_s = [waited_s + self._clock.round_trip_s(m.sysid) for m in self.view.fleet]
-            frames.append(frame_at(self.tracks, time_s, self.period_s, delays_s))
+            delays_s = [waited_s + track.round_trip_s for track in self.tracks]
+            pairs = zip(self.tracks, self._autopilots, strict=True)
+            driven = [t.mode_at(time_s - self.period_s) == a.driven_mode for t, a in pairs]
+            frames.append(frame_at(self.tracks, time_s, self.period_s, delays_s, driven))
             self._next_tick += 1
             if len(frames) == round(LONG_GAP_S / self.period_s):
                 newest = int((self.newest_s + 1e-3) / self.period_s)

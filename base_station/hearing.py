@@ -1,15 +1,15 @@
-"""What a twin has heard of the orders sent: as late and as seldom as the link lets them through.
+"""What a twin has heard of the set-points sent: as late and as seldom as the link lets through.
 
-Nobody knows which command got lost; but how many reports do is seen, and so is the round trip. Row
-0 hears all of them; the others lose as many as the link does, each its own.
+Nobody knows which set-point got lost; but how many reports do is seen, and so is the round trip.
+Draw 0 hears all of them; the others lose as many as the link does, each its own. A change of mode
+is confirmed, but late or never: half of the draws change when it was due, half when it is known.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.commander import REPEAT_S
 from base_station.execution import Orders, hold
 from base_station.telemetry import Frame
 
@@ -21,14 +21,10 @@ LATEST_TICKS = 20  # older orders are not remembered: a link that slow is as goo
 
 @dataclass(frozen=True, eq=False)
 class Hearing:
-    """`setpoints` [D, V, 3] and `driven` [D, V] as heard by each of D draws.
-
-    `retry` [D, V]: ticks until a mode change that got lost is sent again. `past`: orders sent.
-    """
+    """`setpoints` [D, V, 3] as heard by each of D draws, `driven` [D, V]; `past` orders, as sent."""
 
     setpoints: Array
     driven: Flags
-    retry: NDArray[np.intp]
     past: tuple[Orders, ...]
 
     def of_rows(self, rows: int) -> tuple[Array, Flags]:
@@ -40,13 +36,9 @@ class Hearing:
 def nothing_yet(draws: int, vehicles: int, past: tuple[Orders, ...] = ()) -> Hearing:
     """Everybody in HOLD, or under the last of the orders sent in the `past`."""
     last = past[-1] if past else hold(vehicles)
-    shape = (draws, vehicles)
-    return Hearing(
-        np.broadcast_to(last.setpoints, (*shape, 3)),
-        np.broadcast_to(last.driven, shape),
-        np.zeros(shape, dtype=np.intp),
-        past[-LATEST_TICKS:],
-    )
+    setpoints = np.broadcast_to(last.setpoints, (draws, vehicles, 3))
+    driven = np.broadcast_to(last.driven, (draws, vehicles))
+    return Hearing(setpoints, driven, past[-LATEST_TICKS:])
 
 
 def heard(hearing: Hearing, orders: Orders, frame: Frame, period_s: float) -> Hearing:
@@ -54,20 +46,15 @@ def heard(hearing: Hearing, orders: Orders, frame: Frame, period_s: float) -> He
     past = (*hearing.past, orders)[-LATEST_TICKS:]
     late = np.minimum(np.nan_to_num(frame.delay_s) / period_s, len(past) - 1).astype(np.intp)
     vehicles = np.arange(len(late))
-    setpoints = np.stack([o.setpoints for o in past])[-1 - late, vehicles]
-    driven = np.stack([o.driven for o in past])[-1 - late, vehicles]
-    if not frame.loss.any() and not hearing.retry.any():
-        shape = hearing.driven.shape
-        everything = np.broadcast_to(setpoints, (*shape, 3)), np.broadcast_to(driven, shape)
-        return Hearing(*everything, hearing.retry, past)
-    rng = np.random.default_rng(round(frame.time_s * 1000))
-    through = rng.random(hearing.driven.shape) >= frame.loss
-    through[0] = True
-    changes = hearing.driven != driven
-    before = past[-2 - late.max()] if len(past) > 1 + late.max() else past[0]
-    again = changes & ((hearing.retry == 0) | (before.driven != driven))
-    taken = again & through
-    retry = np.where(again & ~through, round(REPEAT_S / period_s), np.maximum(hearing.retry - 1, 0))
-    now_driven = np.where(taken, driven, hearing.driven)
-    now_setpoints = np.where((through & now_driven)[..., None], setpoints, hearing.setpoints)
-    return Hearing(now_setpoints, now_driven, np.where(taken, 0, retry), past)
+    arriving = np.stack([o.setpoints for o in past])[-1 - late, vehicles]
+    due = np.stack([o.driven for o in past])[-1 - late, vehicles]
+    half = (np.arange(len(hearing.driven)) % 2 == 0)[:, None]
+    setpoints = np.broadcast_to(arriving, hearing.setpoints.shape)
+    if frame.loss.any():
+        rng = np.random.default_rng(round(frame.time_s * 1000))
+        lost = rng.random(setpoints.shape[:2]) < frame.loss
+        lost[0] = False
+        setpoints = np.where(lost[..., None], hearing.setpoints, setpoints)
+    return replace(
+        hearing, setpoints=setpoints, driven=np.where(half, due, frame.driven), past=past
+    )

@@ -6,7 +6,7 @@ orders into commands.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from base_station import doubt as doubts
 from base_station.autopilots import Rate
@@ -160,9 +160,10 @@ class Station:
         self._preparations[index].hear(message.value)
         match message.value:
             case mavlink.CommandAck(command=mavlink.Command.DO_SET_MODE, result=0):
-                asked = self._commander.mode_asked(index)
-                if asked is not None:
-                    desk.fleet.mode_acknowledged(index, asked)
+                track = desk.fleet.tracks[index]
+                mode = self._commander.acknowledged(index, track, desk.time_s)
+                if mode is not None:
+                    desk.fleet.mode_acknowledged(index, mode)
             case mavlink.CommandAck(command=command, result=result) if result:
                 desk.say("command", f"{member.name} refused command {command} (result {result})")
             case mavlink.StatusText(text=text):
@@ -187,7 +188,10 @@ class Station:
         if silent_since_s is not None:
             self._open_gap(silent_since_s)
         live = desk.fleet.newest_s - frame.time_s < GAP_S / 2
-        obeyed = desk.orders if self._gap is None else self._gap.obeyed(frame, desk.orders, live)
+        obeyed = desk.orders
+        if self._gap is not None:
+            obeyed = self._gap.obeyed(frame, desk.orders, live)
+            frame = replace(frame, driven=obeyed.driven)
         alarms = desk.watch.tick(frame, obeyed)
         if desk.doubt is not None:
             desk.doubt = doubts.tick(desk.doubt, frame, obeyed, desk.fleet.period_s)

@@ -55,6 +55,7 @@ class Frame:
     fresh: NDArray[np.bool_]  # [V]
     loss: Array  # [V] share of reports that got lost lately
     delay_s: Array  # [V] from here until orders that answer it take effect
+    driven: NDArray[np.bool_]  # [V] since the frame before it was in a mode that takes set-points
 
 
 class Track:
@@ -64,6 +65,19 @@ class Track:
         self.status = Status()
         self.samples: deque[Sample] = deque(maxlen=HISTORY)
         self.last_heard_wall_s = float("-inf")
+        self.round_trip_s = 0.0
+        self._modes: deque[tuple[float, int]] = deque(maxlen=HISTORY)
+
+    def said(self, status: Status) -> None:
+        """A new status, at the time of the newest sample."""
+        if status.mode != self.status.mode:
+            self._modes.append((self.newest_s(), status.mode))
+        self.status = status
+
+    def mode_at(self, time_s: float) -> int:
+        """The mode it was in after the sample of `time_s`."""
+        known = [mode for since_s, mode in self._modes if since_s <= time_s + 1e-3]
+        return known[-1] if known else self.status.mode
 
     def position(self, sample: Sample) -> None:
         if not self.samples or sample.time_s > self.samples[-1].time_s:
@@ -123,7 +137,11 @@ def note(status: Status, value: object, motors: int) -> Status:
 
 
 def frame_at(
-    tracks: list[Track], time_s: float, period_s: float, delays_s: Sequence[float]
+    tracks: list[Track],
+    time_s: float,
+    period_s: float,
+    delays_s: Sequence[float],
+    driven: Sequence[bool],
 ) -> Frame:
     """The whole fleet at `time_s`, each vehicle from its newest sample by then."""
     rows = [t.at(time_s) for t in tracks]
@@ -136,4 +154,5 @@ def frame_at(
         np.array([r is not None for r in rows]),
         np.array([t.loss(time_s, period_s) for t in tracks]),
         np.array(delays_s),
+        np.array(driven),
     )

@@ -54,8 +54,8 @@ class Plant:
         if since_s >= 0.0:
             report[SUSPECT] = self._falsified(since_s)
         noisy = report + 0.015 * self.rng.standard_normal(report.shape)
-        still, fresh = np.zeros((3, 2)), np.ones(3, dtype=np.bool_)
-        return Frame(self.time_s, noisy, still, np.zeros(3), fresh, np.zeros(3), np.zeros(3))
+        still, none, fresh = np.zeros((3, 2)), np.zeros(3), np.ones(3, dtype=np.bool_)
+        return Frame(self.time_s, noisy, still, none, fresh, none, none, orders.driven)
 
     def _falsified(self, since_s: float) -> NDArray[np.float64]:
         late = round(float(self.reports.lag_s[0]) / PERIOD_S)
