@@ -21,7 +21,7 @@ LATEST_TICKS = 20  # older orders are not remembered: a link that slow is as goo
 
 @dataclass(frozen=True, eq=False)
 class Hearing:
-    """`setpoints` [D, V, 3] as heard by each of D draws, `driven` [D, V]; `past` orders, as sent."""
+    """`setpoints` [D, V, 3] and `driven` [D, V] as heard by each of D draws; `past`: as sent."""
 
     setpoints: Array
     driven: Flags
