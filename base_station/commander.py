@@ -1,5 +1,6 @@
 """The sending side: what every vehicle should be doing to commands, repeated until it is."""
 
+import math
 from dataclasses import dataclass, replace
 
 from base_station.autopilots import adapter
@@ -11,6 +12,7 @@ from hil.scenario import StationView
 
 ARM_REPEAT_S = 0.5
 REPEAT_S = 0.2  # of a mode: until it has been taken, a vehicle does something else
+LOSSY, MISSED = 0.01, 0.01  # from which loss on; the chance that is left of missing all copies
 STICK_US = 100
 SURE = 0.7  # of the round trip: it varies
 SURE_BEATS = 2
@@ -35,7 +37,7 @@ class Commander:
     """One entry per vehicle, in fleet order. A released vehicle gets nothing but heartbeats."""
 
     def __init__(self, view: StationView) -> None:
-        self._view = view
+        self._view, self._rate_hz = view, view.clock.telemetry_hz
         self.autopilots = tuple(adapter(m.autopilot, m.frame) for m in view.fleet)
         self._sent = [_Sent() for _ in view.fleet]
         self._arm_sent_s = [float("-inf")] * len(view.fleet)
@@ -55,8 +57,8 @@ class Commander:
 
         An answer does not say what it answers, but none comes faster than the round trip.
         """
-        sent, tick_s = self._sent[index], 1.0 / self._view.clock.telemetry_hz
-        soon = time_s - sent.asked_s < SURE * track.round_trip_s - tick_s
+        sent = self._sent[index]
+        soon = time_s - sent.asked_s < SURE * track.round_trip_s - 1.0 / self._rate_hz
         return None if soon else sent.mode
 
     def carry_out(self, orders: Orders, tracks: list[Track], time_s: float) -> list[Command]:
@@ -93,7 +95,7 @@ class Commander:
         self._sent[index] = replace(
             sent, mode=wanted, time_s=time_s, asked_s=asked_s, confirmed=False
         )
-        return [SetMode(sysid, wanted)]
+        return [SetMode(sysid, wanted)] * _copies(track.loss(time_s, 1.0 / self._rate_hz))
 
     def _is_strayed(self, index: int, driven: bool, status: Status, time_s: float) -> bool:
         """Whether somebody else has this vehicle: it gets no command while that may be so.
@@ -139,6 +141,11 @@ class Commander:
             and sent.strayed_since_s is not None
             and time_s - sent.strayed_since_s >= TAKEOVER_S
         ]
+
+
+def _copies(loss: float) -> int:
+    """How often to send what must arrive: until it moves on, a vehicle does what it did before."""
+    return 1 if loss < LOSSY else 1 + round(math.log(MISSED) / math.log(min(loss, 0.5)))
 
 
 def _moved(before_us: tuple[int, ...], now_us: tuple[int, ...]) -> bool:
