@@ -85,8 +85,9 @@ def _resumed(desk: Desk, gap: Gap, now_s: float) -> AnyPhase:
     match desk.phase:
         case Probing():
             return Probing(now_s)
-        case Experimenting():
-            desk.tries -= 1  # the one that was cut short does not count
+        case Experimenting(plan=plan):  # the one that was cut short does not count
+            desk.soloed = desk.soloed and not plan.solo
+            desk.tries -= not plan.solo
             return Concluding(now_s)
         case phase:
             late_s = now_s - gap.since_s

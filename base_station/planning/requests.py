@@ -93,6 +93,11 @@ class OpenLoopPlan:
     predicted_reports: Array
     prediction: Prediction | None = None
 
+    @property
+    def solo(self) -> bool:
+        """Whether one vehicle is driven alone, and nobody is to be touched."""
+        return len(self.held) == self.setpoints.shape[1] - 1
+
 
 @dataclass(frozen=True)
 class PolicyWeights:

@@ -20,7 +20,7 @@ from tests.scenarios.bench import Heard, run_until_ended, scripted, start
 
 DEAD_S = 4.0
 RIGHT = {"rescue": "motor_y_off", "stuck_gps": "gps_east_stuck"}
-PHASES = {"probe": 7.0, "plan_alpha": 20.0, "experiment": 22.5}
+PHASES = {"probe": 7.0, "plan_alpha": 31.0, "experiment": 33.5}
 
 
 class Dead:
