@@ -22,7 +22,7 @@ from hil.faults import Type, Unit
 
 Array = NDArray[np.float64]
 
-ACROSS = 0.3  # share of a motion that makes the other axis uncertain, too
+ACROSS = 1.0  # a heading off by MODEL_ERROR (6 degrees) takes so much of a motion to the other axis
 FLOOR = 1e-3  # 'something else' is never ruled out before an experiment
 
 

@@ -14,7 +14,7 @@ from typing import TextIO
 
 import numpy as np
 
-from base_station.hypotheses import candidates
+from base_station.hypotheses import SIZES, candidates
 from base_station.planning.attempts import Attempts
 from base_station.planning.learning import ppo
 from base_station.planning.learning.lesson import Lesson
@@ -79,9 +79,8 @@ def _serve(view: StationView, lines: TextIO, out: TextIO, attempts: Attempts) ->
 def warm_up(view: StationView) -> None:
     """Compile the kernel and learn for one rollout, so that the first request is not slower."""
     start = initial_state(np.zeros((len(view.fleet), 2)), np.zeros(len(view.fleet)))
-    hypotheses = tuple(h for h in candidates(view.fleet[0], view.diagnosis.priors) if h.has_twin)[
-        :2
-    ]
+    known = candidates(view.fleet[0], view.diagnosis.priors)
+    hypotheses = tuple(h for h in known if h.has_twin and h.kind not in SIZES)[:2]
     request = PlanRequest(
         number=0,
         kind="alpha",

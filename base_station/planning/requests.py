@@ -96,7 +96,7 @@ class OpenLoopPlan:
     @property
     def solo(self) -> bool:
         """Whether one vehicle is driven alone, and nobody is to be touched."""
-        return len(self.held) == self.setpoints.shape[1] - 1
+        return len(self.held) == int(self.setpoints.shape[1]) - 1
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 
 from base_station.hypotheses import NONE, UNKNOWN, candidates
+from hil.bench.labels import expected_hypothesis
 from hil.bench.lines import Outcome, Verdict
 from hil.bench.record import RunRecord, Struck
-from hil.faults import Fault, Type, Unit
 from hil.scenario import GoalOutcome, Scenario, station_view
 from hil.world.truth import TruthRecord
 
@@ -61,14 +61,9 @@ def true_hypotheses(scenario: Scenario, struck: tuple[Struck, ...]) -> dict[int,
     names = {}
     for sysid in {s.fault.vehicle for s in struck}:
         faults = [s.fault.fault() for s in struck if s.fault.vehicle == sysid]
-        motors = len(members[sysid].frame.motors)
+        name = expected_hypothesis(faults, members[sysid].frame)
         known = candidates(members[sysid], scenario.diagnosis.priors)
-        fitting = [
-            h.name
-            for h in known
-            if h.fault and _effect([h.fault], motors) == _effect(faults, motors)
-        ]
-        names[sysid] = fitting[0] if fitting else UNKNOWN
+        names[sysid] = name if name in {h.name for h in known} else UNKNOWN
     return names
 
 
@@ -79,23 +74,6 @@ def is_correct(verdict: Verdict | None, truth: dict[int, str]) -> bool:
     if not verdict.decided:
         return False
     return truth.get(verdict.sysid, NONE) == verdict.hypothesis
-
-
-def _effect(
-    faults: list[Fault], motors: int
-) -> tuple[frozenset[int], frozenset[str], frozenset[Fault]]:
-    """Motors that are off, GPS axes that are stuck, all else: equal effects are equal faults."""
-    off: set[int] = set()
-    stuck: set[str] = set()
-    others: set[Fault] = set()
-    for f in faults:
-        if (f.unit, f.type) == (Unit.MOTOR, Type.OFF):
-            off |= set(f.instances or range(1, motors + 1))
-        elif (f.unit, f.type) == (Unit.GPS, Type.STUCK):
-            stuck |= set(f.axes or ("north", "east", "down"))
-        else:
-            others.add(f)
-    return frozenset(off), frozenset(stuck), frozenset(others)
 
 
 def _goals(scenario: Scenario, outcome: Outcome, truth: TruthRecord) -> dict[int, GoalScore]:

@@ -6,9 +6,9 @@ import pytest
 from campaign_builders import healthy, row
 
 from hil.bench.campaign.file import Campaign
-from hil.bench.campaign.labels import CANNOT_TELL, NO_ALARM, WRONG_VEHICLE
 from hil.bench.campaign.report import scores
 from hil.bench.campaign.row import Row
+from hil.bench.labels import CANNOT_TELL, NO_ALARM, WRONG_VEHICLE
 
 UNTOLD = row(decided=False)
 UNNOTICED = row(

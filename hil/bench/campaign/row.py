@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from hil.bench.campaign.labels import CANNOT_TELL, NO_ALARM, NONE, WRONG_VEHICLE
+from hil.bench.labels import CANNOT_TELL, NO_ALARM, NONE, WRONG_VEHICLE
 
 
 @dataclass(frozen=True)

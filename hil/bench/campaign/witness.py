@@ -6,7 +6,7 @@ from typing import Any
 
 from base_station.listeners import Silent
 from base_station.records import Event, Snapshot
-from hil.bench.campaign.labels import UNKNOWN
+from hil.bench.labels import UNKNOWN
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ from dataclasses import replace
 from base_station.hypotheses import candidates
 from base_station.planning.planner import plan
 from base_station.planning.requests import PlanProgress, PlanReady, PlanRequest
-from hil.bench.campaign.labels import NONE, expected_hypothesis
 from hil.bench.campaign.plan import RunSpec
 from hil.bench.campaign.planners import planner
 from hil.bench.campaign.row import Row
 from hil.bench.campaign.witness import Witness
 from hil.bench.folders import blind_view
 from hil.bench.injector import Breaker
+from hil.bench.labels import NONE, expected_hypothesis
 from hil.bench.onsets import Onsets
 from hil.bench.rig import Rig
 from hil.scenario import FaultModel, Scenario, StationView

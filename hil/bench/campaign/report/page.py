@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.bench.campaign.file import Campaign
-from hil.bench.campaign.labels import CANNOT_TELL, NONE, UNKNOWN
 from hil.bench.campaign.report import scores
 from hil.bench.campaign.report.scores import Chosen, Forecasts, is_decided
 from hil.bench.campaign.row import Row
@@ -24,6 +23,7 @@ from hil.bench.campaign.stats import (
     tempered,
     upper_bound,
 )
+from hil.bench.labels import CANNOT_TELL, NONE, UNKNOWN
 from hil.bench.report.page import STYLE
 
 CAPTIONS = {

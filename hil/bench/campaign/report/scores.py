@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.bench.campaign.file import Campaign
-from hil.bench.campaign.labels import CANNOT_TELL, NO_ALARM, NONE, UNKNOWN
 from hil.bench.campaign.row import Row
 from hil.bench.campaign.stats import Array, Estimate, by_cluster, proportion, rate, upper_bound
+from hil.bench.labels import CANNOT_TELL, NO_ALARM, NONE, UNKNOWN
 
 SURE = 0.99
 S_PER_H = 3600.0

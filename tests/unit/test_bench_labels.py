@@ -3,7 +3,7 @@
 import pytest
 
 from hil.airframe import AIRFRAMES
-from hil.bench.campaign.labels import expected_hypothesis
+from hil.bench.labels import expected_hypothesis
 from hil.faults import Fault, Type, Unit
 
 FRAME = AIRFRAMES["omni_plus"]
