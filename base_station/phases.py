@@ -42,18 +42,20 @@ class Settling:
 
 @dataclass(frozen=True)
 class PlanningAlpha:
-    """[1] The planner is at work on request `number`; the fleet holds."""
+    """[1] The planner is at work on request `number`, for `twins` (names); the fleet holds."""
 
     number: int
+    twins: tuple[str, ...] = ()
     name: Phase = "plan_alpha"
 
 
 @dataclass(frozen=True, eq=False)
 class Experimenting:
-    """[2]"""
+    """[2] `twins` are the names of those that `plan` predicts."""
 
     plan: OpenLoopPlan
     since_s: float
+    twins: tuple[str, ...] = ()
     name: Phase = "experiment"
 
 

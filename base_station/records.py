@@ -83,12 +83,25 @@ class TwinSnapshot:
     yaw_rad: Array
 
 
+@dataclass(frozen=True, eq=False)
+class Foreseen:
+    """The experiment under way: `reports_m` [H, K+1, V, 2] is what each of `hypotheses` expects
+    to be received, from before the first set-point to after the last."""
+
+    hypotheses: tuple[str, ...]
+    reports_m: Array
+
+
 @dataclass(frozen=True)
 class Snapshot:
-    """The station's whole belief at one instant; `threshold` is the alarm level of `cusum`."""
+    """The station's whole belief at one instant; `threshold` is the alarm level of `cusum`.
+
+    `foreseen` is there from before an experiment is driven until it is over.
+    """
 
     time_s: float
     phase: Phase
     threshold: float
     vehicles: tuple[VehicleSnapshot, ...]
     twins: tuple[TwinSnapshot, ...]
+    foreseen: Foreseen | None = None

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from base_station import twin
 from base_station.desk import Desk
 from base_station.phases import Concluding, Experimenting, OnMission, Probing, Returning
-from base_station.records import Snapshot, TwinSnapshot, VehicleSnapshot
+from base_station.records import Foreseen, Snapshot, TwinSnapshot, VehicleSnapshot
 from base_station.telemetry import Frame
 
 Array = NDArray[np.float64]
@@ -18,7 +18,17 @@ def snapshot(desk: Desk, frame: Frame) -> Snapshot:
     """Everything the station knows and believes at `frame`."""
     watch = desk.watch
     vehicles = tuple(_vehicle(desk, frame, v) for v in range(len(desk.view.fleet)))
-    return Snapshot(frame.time_s, desk.phase.name, watch.threshold, vehicles, _twins(desk))
+    return Snapshot(
+        frame.time_s, desk.phase.name, watch.threshold, vehicles, _twins(desk), _foreseen(desk)
+    )
+
+
+def _foreseen(desk: Desk) -> Foreseen | None:
+    match desk.phase:
+        case Experimenting(plan, _, twins) if twins:
+            return Foreseen(twins, plan.predicted_reports)
+        case _:
+            return None
 
 
 def _vehicle(desk: Desk, frame: Frame, v: int) -> VehicleSnapshot:

@@ -282,8 +282,8 @@ def own_decision(desk: Desk, frame: Frame) -> Orders:
             return probe(desk, phase, frame)
         case Settling() as phase:
             return settle(desk, phase, frame)
-        case PlanningAlpha(number=number):
-            return await_alpha(desk, number)
+        case PlanningAlpha() as phase:
+            return await_alpha(desk, phase)
         case Experimenting() as phase:
             return experiment(desk, phase, frame)
         case Concluding() as phase:

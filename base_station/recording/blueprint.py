@@ -8,7 +8,7 @@ import rerun.blueprint as rrb
 from base_station.hypotheses import UNKNOWN
 from base_station.recording.columns import SIM_TIME, WALL_TIME
 from base_station.recording.legend import MARGIN
-from base_station.recording.scene import hypotheses
+from base_station.recording.scene import TWIN_TRAILS, hypotheses
 from hil.scenario import Arena, StationView
 
 TABS = ("Overview", "Diagnosis", "Learning", "Mission", "Map", "Log")
@@ -116,8 +116,9 @@ def _close_up(view: StationView, *also: str) -> Any:
 def _space(view: StationView, title: str, contents: Sequence[str], eye: Any, trail_s: float) -> Any:
     shown_s = {"/trail": trail_s, "/truth/trail": trail_s}
     if TWINS in contents:
+        shown_s[TWIN_TRAILS] = trail_s
+    if "/focus" in contents:  # too small to be seen from afar
         twins = [h for h in hypotheses(view) if h != UNKNOWN]
-        shown_s |= {f"/twins/{h}/trail": trail_s for h in twins}
         shown_s |= {f"/twins/{h}/report": TUBE_S for h in twins}
     shown_s["/truth/contacts"] = max(CONTACT_S, trail_s if trail_s == WHOLE_S else 0.0)
     return rrb.Spatial3DView(
@@ -154,7 +155,7 @@ def _last(seconds: float) -> Any:
 
 def _posterior(legend: bool = False) -> Any:
     name = "What is wrong? Posterior probability"
-    return _plot(name, "/belief/posterior", legend=legend, y=(-0.05, 1.05))
+    return _plot(name, "/belief/posterior/**", legend=legend, y=(-0.05, 1.05))
 
 
 def _alarm(axis: str) -> Any:

@@ -7,9 +7,10 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from base_station.planning.requests import OpenLoopPlan, PlanProgress, PlanReady, Training
+from base_station.planning.requests import PlanProgress, PlanReady, Training
 from base_station.recording import columns as col
 from base_station.recording import palette, scene
+from base_station.records import Foreseen
 
 ALPHA_SHOWN_IN = ("plan_alpha", "experiment", "plan_beta")
 BETA_SHOWN_IN = ("plan_beta", "mission", "return", "done")
@@ -21,7 +22,7 @@ LAYER_M = 0.003  # between the lines of two hypotheses
 class LearningRows:
     """Curves are /learning/<kind>/<number>/attempt_<k>; the caller has set the time.
 
-    Plans are /plan/alpha/<hypothesis> and /plan/beta.
+    Plans are /plan/alpha/<hypothesis>, the suspect alone as well as contact, and /plan/beta.
     """
 
     def __init__(self, stream: Any, vehicles: int) -> None:
@@ -30,6 +31,7 @@ class LearningRows:
         self._request = "plan/0"
         self._told_steps: dict[str, int] = {}
         self._drawn: dict[str, Sequence[str]] = {}  # plan, and the phases it is shown in
+        self._reports_m: Array | None = None  # of the experiment drawn last
 
     def progress(self, progress: PlanProgress) -> None:
         """A curve as it grows, over time and over steps."""
@@ -60,34 +62,36 @@ class LearningRows:
         bars = rr.BarChart(rewards, abscissa=steps - widths / 2, widths=widths, color=color)
         self._stream.log(f"/curves/{outcome}/{place}", bars)
 
-    def plan(self, ready: PlanReady, hypotheses: Sequence[str]) -> None:
-        """The trainings behind a plan; `hypotheses` names the twins that predict, in order."""
+    def plan(self, ready: PlanReady) -> None:
+        """The trainings behind a plan, and plan beta."""
         self._request = f"{ready.kind}/{ready.number}"
         for training in ready.trainings:
             self.training(training)
-        if ready.plan is not None:
-            self._draw_alpha(ready.plan, hypotheses)
         if ready.predicted_m is not None:
             self._draw_beta(ready.predicted_m)
 
     def phase(self, phase: str) -> None:
         """A plan that is over is taken off the plane."""
-        for path in [path for path, phases in self._drawn.items() if phase not in phases]:
-            self._stream.log(path, rr.LineStrips3D([]))
-            del self._drawn[path]
+        self._wipe([path for path, phases in self._drawn.items() if phase not in phases])
 
-    def _draw_alpha(self, plan: OpenLoopPlan, hypotheses: Sequence[str]) -> None:
-        """What each twin expects to be reported."""
-        reports_m = plan.predicted_reports
-        names = tuple(hypotheses)
-        if len(names) != len(reports_m):
-            names = tuple(f"hypothesis_{k}" for k in range(len(reports_m)))
-        for k, (name, report_m) in enumerate(zip(names, reports_m, strict=True)):
+    def experiment(self, foreseen: Foreseen | None) -> None:
+        """What each twin expects to be reported; drawn once, instead of the experiment before."""
+        if foreseen is None or foreseen.reports_m is self._reports_m:
+            return
+        self._reports_m = foreseen.reports_m
+        self._wipe([path for path in self._drawn if path.startswith("/plan/alpha/")])
+        pairs = zip(foreseen.hypotheses, foreseen.reports_m, strict=True)
+        for k, (name, report_m) in enumerate(pairs):
             strips = _strips(report_m, scene.PLAN_Z_M + LAYER_M * k)
             color = palette.hypothesis_color(name)
             path = f"/plan/alpha/{name}"
             self._stream.log(path, rr.LineStrips3D(strips, colors=color, radii=0.02))
             self._drawn[path] = ALPHA_SHOWN_IN
+
+    def _wipe(self, paths: Sequence[str]) -> None:
+        for path in paths:
+            self._stream.log(path, rr.LineStrips3D([]))
+            del self._drawn[path]
 
     def _draw_beta(self, predicted_m: Array) -> None:
         """Where the believed twin goes under the policy, in the colours of the vehicles."""

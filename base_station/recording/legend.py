@@ -4,15 +4,16 @@ from typing import Any
 
 import rerun as rr
 
-from base_station.hypotheses import NONE, UNKNOWN
-from base_station.recording.palette import TRUTH, WHITE, hypothesis_color, vehicle_color
-from base_station.recording.scene import DISC_M, GROUND_Z_M, at, circle, hypotheses
+from base_station.hypotheses import NONE
+from base_station.recording.palette import LIGHT_GREY, TRUTH, WHITE, hypothesis_color, vehicle_color
+from base_station.recording.scene import DISC_M, GROUND_Z_M, at, circle, usual
 from hil.scenario import StationView
 
 ROWS = 8  # more do not fit beside the arena
 MARGIN = 0.17  # of the arena's width, between it and the middle of an entry
 SIZE = 0.13  # radius of a sign, of the distance between two
 WELL = "if all is well"
+OTHERS = "paler, darker: see Log"
 
 
 def log_legend(stream: Any, view: StationView) -> None:
@@ -42,7 +43,7 @@ def log_legend(stream: Any, view: StationView) -> None:
     )
     stream.log("/plane/legend/setpoint", arrow, static=True)
 
-    twins = [name for name in hypotheses(view) if name != UNKNOWN][: ROWS - 1]
+    twins = usual(view)[: ROWS - 2]
     rings = rr.LineStrips3D(
         [circle(n, east_m, size_m, GROUND_Z_M) for n in norths_m[: len(twins) + 1]],
         colors=[TRUTH, *map(hypothesis_color, twins)],
@@ -52,6 +53,7 @@ def log_legend(stream: Any, view: StationView) -> None:
 
     texts_west = [*((m.name, vehicle_color(k)) for k, m in enumerate(fleet)), ("ordered", WHITE)]
     texts_east = [("truth", TRUTH), *((_if(name), hypothesis_color(name)) for name in twins)]
+    texts_east.append((OTHERS, LIGHT_GREY))
     rows = [(west_m, k, *text) for k, text in enumerate(texts_west)]
     rows += [(east_m, k, *text) for k, text in enumerate(texts_east)]
     below_m = 1.2 * size_m  # the viewer writes a label just below its point

@@ -2,11 +2,19 @@
 
 The hues are Okabe and Ito's, which people with any kind of colour blindness can tell apart.
 Vehicles and hypotheses share none. Broken motors are warm, broken GPS is cool, nothing is grey.
+Explanations that are likely beforehand have a hue to themselves, others a paler or darker one.
 """
 
 from collections.abc import Sequence
 
 Rgb = tuple[int, int, int]
+
+
+def mix(a: Rgb, b: Rgb, share_of_b: float) -> Rgb:
+    """A colour between two."""
+    r, g, b_ = (round(x + (y - x) * share_of_b) for x, y in zip(a, b, strict=True))
+    return r, g, b_
+
 
 SKY_BLUE: Rgb = (86, 180, 233)
 YELLOW: Rgb = (240, 228, 66)
@@ -17,6 +25,7 @@ PURPLE: Rgb = (204, 121, 167)
 BLUE: Rgb = (0, 114, 178)
 WHITE: Rgb = (255, 255, 255)
 BLACK: Rgb = (0, 0, 0)
+LAVENDER: Rgb = (206, 196, 255)
 DIM: Rgb = (110, 116, 126)
 LIGHT_GREY: Rgb = (200, 200, 200)
 GREY: Rgb = (150, 150, 150)
@@ -32,8 +41,17 @@ _VEHICLES = (SKY_BLUE, YELLOW, GREEN)
 _HYPOTHESES: dict[str, Rgb] = {
     "motor_y_off": VERMILION,
     "motor_x_off": ORANGE,
+    "motor_y_partial": mix(VERMILION, WHITE, 0.5),
+    "motor_x_partial": mix(ORANGE, WHITE, 0.6),
+    "motor_y_reversed": mix(VERMILION, BLACK, 0.4),
+    "motor_x_reversed": mix(ORANGE, BLACK, 0.45),
     "gps_east_stuck": PURPLE,
     "gps_north_stuck": BLUE,
+    "gps_stuck": LAVENDER,
+    "gps_offset": mix(BLUE, WHITE, 0.45),
+    "gps_drift": mix(PURPLE, WHITE, 0.5),
+    "gps_noise": mix(PURPLE, BLACK, 0.4),
+    "gps_delay": mix(BLUE, BLACK, 0.25),
     "none": GREY,
     "unknown": DARK_GREY,
 }
@@ -76,9 +94,3 @@ def hypothesis_color(name: str) -> Rgb:
     hues = _FAMILIES.get(name.split("_")[0], (PURPLE, ORANGE))
     shade, hue = divmod(sum(name.encode()), len(hues))
     return mix(hues[hue], WHITE, 0.3 + 0.1 * (shade % 5))
-
-
-def mix(a: Rgb, b: Rgb, share_of_b: float) -> Rgb:
-    """A colour between two."""
-    r, g, b_ = (round(x + (y - x) * share_of_b) for x, y in zip(a, b, strict=True))
-    return r, g, b_

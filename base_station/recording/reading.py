@@ -46,6 +46,15 @@ class Recording:
         values = np.array([v for _, v in whole], dtype=np.float64).reshape(len(whole), width)
         return Series(np.array([t for t, _ in whole]), values, tuple(map(str, names)))
 
+    def family(self, root: str) -> Series:
+        """The series of all entities right below `root`, by name; NaN where one has no row."""
+        members = [self.scalars(entity) for entity in self.entities(f"{root}/")]
+        times = np.unique(np.concatenate([np.empty(0), *(m.times for m in members)]))
+        values = np.full((len(times), len(members)), np.nan)
+        for column, member in enumerate(members):
+            values[np.searchsorted(times, member.times), column] = member.values[:, 0]
+        return Series(times, values, tuple(m.names[0] for m in members))
+
     def places(self, entity: str) -> tuple[Array, Array]:
         """Times [T] and north, east [T, V, 2] of bodies."""
         rows = self._rows(entity, "Cylinders3D:centers", SIM_TIME)

@@ -11,7 +11,7 @@ from typing import Any
 
 import rerun as rr
 
-from base_station.hypotheses import candidates
+from base_station.hypotheses import NONE, candidates
 from base_station.recording.columns import RING_M
 from base_station.recording.palette import (
     BLACK,
@@ -26,6 +26,7 @@ from base_station.recording.palette import (
     vehicle_color,
 )
 from hil.airframe import Airframe
+from hil.faults import Type
 from hil.frames import ned_to_wgs84
 from hil.scenario import Rectangle, StationView
 
@@ -38,7 +39,8 @@ PER_VEHICLE = (
     *("residual/north", "residual/east", "alarm/north", "alarm/east"),
     *("speed", "goal_distance", "battery", "satellites"),
 )
-PER_HYPOTHESIS = ("posterior", "log_likelihood", "behind_best")
+PER_HYPOTHESIS = ("log_likelihood", "behind_best")
+TWIN_TRAILS = "/twins/trail"  # of all: a time range of its own for each would cost 3 kB a view
 Point3 = tuple[float, float, float]
 
 
@@ -46,6 +48,17 @@ def hypotheses(view: StationView) -> tuple[str, ...]:
     """Every hypothesis that any vehicle of the fleet could be under, in a fixed order."""
     names = [h.name for m in view.fleet for h in candidates(m, view.diagnosis.priors)]
     return tuple(dict.fromkeys(names))
+
+
+def usual(view: StationView) -> tuple[str, ...]:
+    """Those of them that a legend has room for: dead motors, a stuck GPS, nothing wrong."""
+    likely = {
+        h.name
+        for m in view.fleet
+        for h in candidates(m, view.diagnosis.priors)
+        if h.name == NONE or (h.fault and h.fault.type in (Type.OFF, Type.STUCK))
+    }
+    return tuple(name for name in hypotheses(view) if name in likely)
 
 
 def at(north_m: float, east_m: float, z_m: float = 0.0) -> Point3:
@@ -103,6 +116,11 @@ def style_belief(stream: Any, names: Sequence[str]) -> None:
         stream.log(f"/belief/{quantity}", lines, static=True)
 
 
+def style_posterior(stream: Any, path: str, name: str) -> None:
+    """The line of one hypothesis."""
+    stream.log(path, _lines([name], [hypothesis_color(name)], 2.0), static=True)
+
+
 def style_twin(stream: Any, name: str) -> None:
     """Rings where the fleet would be, spots where it would report to be."""
     color, root = hypothesis_color(name), f"/twins/{name}"
@@ -110,7 +128,6 @@ def style_twin(stream: Any, name: str) -> None:
     stream.log(f"{root}/body", ring, static=True)
     spot = rr.Ellipsoids3D.from_fields(colors=color, fill_mode="majorwireframe", line_radii=0.01)
     stream.log(f"{root}/report", spot, static=True)
-    stream.log(f"{root}/trail", rr.LineStrips3D.from_fields(radii=0.02), static=True)
 
 
 def _style_fleet(stream: Any, view: StationView) -> None:
@@ -119,7 +136,8 @@ def _style_fleet(stream: Any, view: StationView) -> None:
     radii_m = [m.frame.radius_m for m in view.fleet]
     style_bodies(stream, "/fleet", radii_m, colors, solid=True)
     stream.log("/setpoint", rr.Arrows3D.from_fields(colors=WHITE, radii=0.03), static=True)
-    stream.log("/trail", rr.LineStrips3D.from_fields(radii=0.02), static=True)
+    for trail in ("/trail", TWIN_TRAILS):
+        stream.log(trail, rr.LineStrips3D.from_fields(radii=0.02), static=True)
     _log_camera(stream)
     stream.log("/map/fleet", rr.GeoPoints.from_fields(colors=colors, radii=-5.0), static=True)
     for quantity in PER_VEHICLE:

@@ -17,20 +17,27 @@ from hil.scenario import StationView
 SIGMAS = 2.0  # half size of a spot
 MIN_SPOT_M = 0.03  # so that a certain prediction is still seen
 ELSEWHERE_M = 0.02  # a twin's report is drawn where it is off its body, or uncertain
+LINE_FROM, LINE_TO = 0.01, 0.001  # a posterior's line begins at the one, ends below the other
 SLOW_S = 0.5  # between rows of the belief while there is no doubt
 EARLY_S = 1e-6
 FLOOR_NATS = -50.0  # further behind the best makes no difference
 
 
 class TwinRows:
-    """One entity per hypothesis in space; posterior and evidence of all in one entity each."""
+    """One entity per hypothesis in space and for its posterior; evidence of all in one entity.
+
+    A hypothesis has a posterior's line while it is in the running: most never are.
+    """
 
     def __init__(self, batch: col.Batch, stream: Any, view: StationView) -> None:
         self._batch, self._stream = batch, stream
         self._radii_m = [m.frame.radius_m for m in view.fleet]
         self._order = scene.hypotheses(view)
         self._trails = Trails()
+        self._segments: list[tuple[float, ...]] = []  # of this tick
         self._styled: set[str] = set()
+        self._lines: set[str] = set()  # hypotheses whose posterior is being drawn ...
+        self._known_lines: set[str] = set()  # ... or was once
         self._shown: tuple[TwinSnapshot, ...] = ()
         self._told_s = -math.inf
 
@@ -46,24 +53,34 @@ class TwinRows:
             scene.style_belief(self._stream, self._order)
         for twin in twins:
             self._ghosts(twin, doubted=len(twins) > 1)
-        if twins and (len(twins) > 1 or time_s - self._told_s >= SLOW_S - EARLY_S):
+        if self._segments:
+            self._batch.add(scene.TWIN_TRAILS, col.SEGMENTS, self._segments)
+            self._segments = []
+        if len(twins) != 1 or time_s - self._told_s >= SLOW_S - EARLY_S:
             self._told_s = time_s
-            self._belief(twins)
+            self._posterior({t.hypothesis: t.posterior for t in twins})
+            self._evidence(twins)
 
-    def likeliest(self, count: int) -> tuple[str, ...]:
-        """The hypotheses most believed in, in the order of the twins: those a plan is made for."""
-        ranked = sorted(self._shown, key=lambda t: -t.posterior)
-        likely = {t.hypothesis for t in ranked[:count]}
-        return tuple(t.hypothesis for t in self._shown if t.hypothesis in likely)
+    def _posterior(self, posterior: dict[str, float]) -> None:
+        """'unknown' has no twin; what the others leave is its share."""
+        posterior.setdefault(UNKNOWN, max(0.0, 1.0 - sum(posterior.values())))
+        drawn = {
+            name
+            for name, p in posterior.items()
+            if p >= (LINE_TO if name in self._lines else LINE_FROM)
+        }
+        for name in sorted(drawn | self._lines):
+            path = f"/belief/posterior/{name}"
+            if name not in self._known_lines:
+                self._known_lines.add(name)
+                scene.style_posterior(self._stream, path, name)
+            self._batch.add(path, col.SCALARS, posterior[name] if name in drawn else 0.0)
+        self._lines = drawn
 
-    def _belief(self, twins: Sequence[TwinSnapshot]) -> None:
-        best = max(t.log_likelihood for t in twins)
-        posterior = {t.hypothesis: t.posterior for t in twins}
+    def _evidence(self, twins: Sequence[TwinSnapshot]) -> None:
+        best = max((t.log_likelihood for t in twins), default=0.0)
         evidence = {t.hypothesis: t.log_likelihood for t in twins}
         behind = {name: max(FLOOR_NATS, value - best) for name, value in evidence.items()}
-        if len(twins) > 1:  # 'unknown' has no twin; what the others leave is its share
-            posterior.setdefault(UNKNOWN, max(0.0, 1.0 - sum(posterior.values())))
-        self._series("posterior", posterior)
         self._series("log_likelihood", evidence)
         self._series("behind_best", behind)
 
@@ -85,7 +102,7 @@ class TwinRows:
         color = hypothesis_color(name)
         steps = [self._trails.step((name, k), place, color) for k, place in enumerate(bodies)]
         if moved := [step for step in steps if step]:
-            self._batch.add(f"{root}/trail", col.SEGMENTS, moved)
+            self._segments += moved
 
 
 def _spots(twin: TwinSnapshot, doubted: bool) -> list[tuple[float, ...]]:

@@ -44,6 +44,8 @@ class Writer:
             self._state(vehicle.name, vehicle.phase)
         if self._state("fleet", snapshot.phase):
             self._learning.phase(snapshot.phase)
+        set_time(self._stream, snapshot.time_s)
+        self._learning.experiment(snapshot.foreseen)
 
     def event(self, event: Event) -> None:
         """One line of the log; verdict and end also rewrite the brief."""
@@ -63,8 +65,7 @@ class Writer:
 
     def plan(self, ready: PlanReady) -> None:
         set_time(self._stream, self._now_s)
-        twins = len(ready.plan.predicted_reports) if ready.plan else 0
-        self._learning.plan(ready, self._twins.likeliest(twins))
+        self._learning.plan(ready)
 
     def close(self) -> None:
         """Everything kept back goes out, and the stream ends."""

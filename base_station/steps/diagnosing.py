@@ -46,7 +46,8 @@ def _escalate(desk: Desk, named: bool) -> None:
         _believe(desk, best)
     elif not desk.soloed and (plan := escalation.solo(doubt, desk.view)) is not None:
         desk.soloed = True
-        _begin(desk, plan, "plan alpha: the suspect alone, there and back on each axis")
+        twins = tuple(doubt.twins[t].name for t in escalation.plausible(doubt))
+        _begin(desk, plan, twins, "plan alpha: the suspect alone, there and back on each axis")
     elif best.hypothesis != UNKNOWN and escalation.remedy_posterior(doubt) >= diagnosis.decide_at:
         _believe(desk, best)
     elif desk.tries < diagnosis.tries:
@@ -60,26 +61,28 @@ def _request_alpha(desk: Desk) -> None:
         desk.open_doubt, escalation.for_contact(desk.open_doubt)
     )
     number = desk.ask("alpha", hypotheses, tuple(float(x) for x in posterior), states)
-    desk.enter(PlanningAlpha(number))
+    desk.enter(PlanningAlpha(number, tuple(h.name for h in hypotheses)))
 
 
-def await_alpha(desk: Desk, number: int) -> Orders:
+def await_alpha(desk: Desk, phase: PlanningAlpha) -> Orders:
     """[1] The fleet holds until the planner has answered."""
-    answer = desk.answers.pop(number, None)
+    answer = desk.answers.pop(phase.number, None)
     if answer is None:
         return desk.hold()
     if answer.plan is None:
         desk.stop("cannot tell: no manoeuvre found that tells the hypotheses apart")
         return desk.hold()
     desk.tries += 1
-    _begin(desk, answer.plan, announced(answer.plan), **_foretold(answer.plan))
+    _begin(desk, answer.plan, phase.twins, announced(answer.plan), **_foretold(answer.plan))
     return desk.hold()
 
 
-def _begin(desk: Desk, plan: OpenLoopPlan, text: str, **data: object) -> None:
+def _begin(
+    desk: Desk, plan: OpenLoopPlan, twins: tuple[str, ...], text: str, **data: object
+) -> None:
     desk.doubt = doubts.anchor(doubts.awake(desk.open_doubt), desk.mean_report_m())
     desk.say("plan", text, **data)
-    desk.enter(Experimenting(plan, desk.time_s))
+    desk.enter(Experimenting(plan, desk.time_s, twins))
 
 
 def announced(plan: OpenLoopPlan) -> str:

@@ -75,11 +75,12 @@ def test_every_entity_of_the_run_is_there(rrd: Path, rescued: Scenario) -> None:
     expected = {"/fleet", "/trail", "/setpoint", "/focus", "/brief", "/map/fleet", "/map/goals"}
     expected |= {f"/{q}/{axis}" for q in ("residual", "alarm") for axis in ("north", "east")}
     expected |= {"/alarm/threshold", "/battery", "/satellites", "/speed", "/goal_distance"}
-    expected |= {f"/belief/{q}" for q in ("posterior", "log_likelihood", "behind_best")}
+    expected |= {f"/belief/{q}" for q in ("log_likelihood", "behind_best")}
+    expected |= {f"/belief/posterior/{h}" for h in ("none", "motor_y_off", "gps_east_stuck")}
     expected |= {f"/phase/{who}" for who in ("fleet", *(v.name for v in rescued.fleet))}
     expected |= {f"/motors/{v.name}" for v in rescued.fleet}
     for twin in ("none", "motor_y_off", "gps_east_stuck"):
-        expected |= {f"/twins/{twin}/{part}" for part in ("body", "trail")}
+        expected |= {f"/twins/{twin}/body", "/twins/trail"}
     expected |= {"/plan/alpha/motor_y_off", "/plan/alpha/gps_east_stuck", "/plan/beta"}
     expected |= {"/plane/arena", "/plane/goals", "/map/arena"}
     expected |= {f"/truth/{part}" for part in ("fleet", "trail", "contacts", "faults")}
@@ -161,9 +162,9 @@ def test_quantities_have_their_units(recording: Recording, rescued: Scenario) ->
     then = np.isin(np.round(times_s, 3), np.round(distance.times, 3))
     told_m = np.linalg.norm(places_m[then] - goals_m, axis=2)
     assert distance.values[-len(told_m) :] == pytest.approx(told_m, abs=2e-3)
-    posterior = recording.scalars("/belief/posterior").values
-    doubted = np.isfinite(posterior).all(axis=1)
-    assert posterior[doubted].sum(axis=1) == pytest.approx(1.0, abs=1e-6)
+    posterior = np.nan_to_num(recording.family("/belief/posterior").values)
+    assert (posterior.sum(axis=1) <= 1.0 + 1e-6).all()
+    assert (posterior.sum(axis=1) >= 0.95).all()  # lines begin at 1 %
     for vehicle in rescued.fleet:
         outputs = recording.scalars(f"/motors/{vehicle.name}").values
         assert outputs.shape[1] == len(vehicle.frame.motors)

@@ -14,7 +14,15 @@ import numpy as np
 from base_station.planning.requests import OpenLoopPlan, PlanProgress, PlanReady, Training
 from base_station.recorder import Recorder
 from base_station.recording.truth import TruthRecorder
-from base_station.records import Array, Event, Phase, Snapshot, TwinSnapshot, VehicleSnapshot
+from base_station.records import (
+    Array,
+    Event,
+    Foreseen,
+    Phase,
+    Snapshot,
+    TwinSnapshot,
+    VehicleSnapshot,
+)
 from hil.scenario import Scenario, StationView, load_scenario, station_view
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -34,7 +42,7 @@ END_S = 60.0
 NAMES = ("motor_x_off", "motor_y_off", "gps_north_stuck", "gps_east_stuck", "none")
 PRIORS = np.array([0.225, 0.225, 0.225, 0.225, 0.05])
 THRESHOLD = 12.0
-PLAN_ALPHA_S, PLAN_BETA_S = 12.9, 28.9
+PLAN_ALPHA_S, EXPERIMENT_S, PLAN_BETA_S = 12.9, 13.0, 28.9
 
 
 def scenario() -> Scenario:
@@ -119,6 +127,9 @@ class Belief:
 def snapshots() -> Iterator[Snapshot]:
     random, belief = np.random.default_rng(3), Belief()
     cusum, residual = np.zeros((3, 2)), np.zeros((3, 2))
+    plan = plan_alpha().plan
+    assert plan is not None
+    foreseen = Foreseen(NAMES, plan.predicted_reports)
     for tick in range(int(END_S * RATE_HZ) + 1):
         time_s = tick / RATE_HZ
         phase = phase_at(time_s)
@@ -137,7 +148,8 @@ def snapshots() -> Iterator[Snapshot]:
             _vehicle(k, phase, time_s, reported[k], velocity[k], residual[k], cusum[k])
             for k in range(3)
         )
-        yield Snapshot(time_s, phase, THRESHOLD, vehicles, twins)
+        under_way = foreseen if phase == "experiment" else None
+        yield Snapshot(time_s, phase, THRESHOLD, vehicles, twins, under_way)
 
 
 def _vehicle(

@@ -16,6 +16,7 @@ from base_station.recorder import Recorder
 from base_station.recording.merge import merge
 from base_station.recording.scene import NOSE_AT, hypotheses
 from base_station.recording.truth import TruthRecorder
+from base_station.recording.twin_rows import LINE_TO
 from base_station.records import Snapshot
 from benchmarks import recorder as crowd
 from hil.frames import wgs84_to_ned
@@ -174,17 +175,21 @@ def test_a_trail_is_the_way_driven(recording: Path, story: list[Snapshot]) -> No
 
 def test_posterior_and_evidence_per_hypothesis(recording: Path, story: list[Snapshot]) -> None:
     order = hypotheses(fake.view())
-    [(_, names)] = rows(recording, "/belief/posterior", "SeriesLines:names")
-    assert tuple(names) == order
     told = {t.hypothesis: t for t in story[150].twins}
-    posterior = at(temporal(recording, "/belief/posterior", "Scalars:scalars"), 15.0)
+    for name in told:
+        line = f"/belief/posterior/{name}"
+        (p,) = [v for t, v in temporal(recording, line, "Scalars:scalars") if t <= 15.0][-1]
+        assert p == (told[name].posterior if told[name].posterior >= LINE_TO else 0.0)
+        assert [names for _, names in rows(recording, line, "SeriesLines:names")] == [[name]]
+    [(_, names)] = rows(recording, "/belief/log_likelihood", "SeriesLines:names")
+    assert tuple(names) == order
     evidence = at(temporal(recording, "/belief/log_likelihood", "Scalars:scalars"), 15.0)
-    for name, p, value in zip(order, posterior, evidence, strict=True):
+    for name, value in zip(order, evidence, strict=True):
         if name in told:
-            assert p == told[name].posterior
             assert value == told[name].log_likelihood
     rest = 1.0 - sum(t.posterior for t in told.values())
-    assert posterior[order.index("unknown")] == pytest.approx(rest)
+    [unknown] = at(temporal(recording, "/belief/posterior/unknown", "Scalars:scalars"), 15.0)
+    assert unknown == pytest.approx(rest)
     behind = at(temporal(recording, "/belief/behind_best", "Scalars:scalars"), 15.0)
     assert np.nanmax(behind) == 0.0
     assert np.nanmin(behind) >= -50.0
@@ -193,7 +198,8 @@ def test_posterior_and_evidence_per_hypothesis(recording: Path, story: list[Snap
 def test_without_a_doubt_the_belief_is_told_twice_a_second(
     recording: Path, story: list[Snapshot]
 ) -> None:
-    times_s = [t for t, _ in temporal(recording, "/belief/posterior", "Scalars:scalars")]
+    line = "/belief/log_likelihood"
+    times_s = [t for t, _ in temporal(recording, line, "Scalars:scalars")]
     doubted_s = [s.time_s for s in story if len(s.twins) > 1]
     assert {round(t, 3) for t in doubted_s} <= {round(t, 3) for t in times_s}
     sure_s = [t for t in times_s if t < doubted_s[0]]
@@ -273,7 +279,7 @@ def test_plan_alpha_is_drawn_per_hypothesis_until_the_mission(recording: Path) -
         (drawn_s, strips), (cleared_s, nothing) = temporal(
             recording, f"/plan/alpha/{name}", "LineStrips3D:strips"
         )
-        assert drawn_s == pytest.approx(fake.PLAN_ALPHA_S)
+        assert drawn_s == pytest.approx(fake.EXPERIMENT_S)
         paths_m = plan.predicted_reports[k].transpose(1, 0, 2)[..., ::-1]
         assert np.array(strips)[..., :2] == pytest.approx(paths_m, abs=1e-6)
         assert (cleared_s, nothing) == (29.0, [])

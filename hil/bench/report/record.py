@@ -91,7 +91,7 @@ def read_run(folder: Path) -> RunTold:
         residuals={axis: recording.scalars(f"/residual/{axis}") for axis in ("north", "east")},
         alarms={axis: recording.scalars(f"/alarm/{axis}") for axis in ("north", "east")},
         threshold=float(threshold[0, 0]) if threshold.size else float("nan"),
-        posterior=recording.scalars("/belief/posterior"),
+        posterior=recording.family("/belief/posterior"),
         curves=_curves(recording),
     )
 
