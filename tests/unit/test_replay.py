@@ -1,4 +1,7 @@
-"""Replay: a stored log of a rescue still gives the decisions of then; and what differs is said."""
+"""Replay: a stored log of a rescue still gives the decisions of then; and what differs is said.
+
+The log is one of `hil run scenarios/rescue.yaml --in-memory`: `tests/data/keep_rescue.py` renews it.
+"""
 
 import lzma
 from dataclasses import replace
@@ -89,9 +92,9 @@ def test_a_folder_is_compared_with_what_was_decided_in_it(
     (tmp_path / "events.jsonl").write_text(events)
     assert replay_run([tmp_path], None) == 0
     assert "no decisions would differ" in capsys.readouterr().out
-    (tmp_path / "events.jsonl").write_text(events.replace('"time_s": 25.3', '"time_s": 29.3'))
+    (tmp_path / "events.jsonl").write_text(events.replace('"time_s": 36.1', '"time_s": 39.1'))
     assert replay_run([tmp_path], None) == 1
-    assert "then: verdict at 29.3 s" in capsys.readouterr().out
+    assert "then: verdict at 39.1 s" in capsys.readouterr().out
 
 
 def test_what_is_missing_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
