@@ -20,8 +20,9 @@ LEGEND = """\
 | circle with a dot | goal, and how near counts as reached |
 | dashed line | the geofence, if there is one: no plan leaves it |
 
-One colour per vehicle and one per hypothesis, the same in all views. Broken motors are
-orange and red, a stuck GPS is purple and blue, nothing wrong is grey.
+One colour per vehicle and one per hypothesis, the same in all views. Dead motors are orange and
+red, a stuck GPS is purple, blue and lavender, nothing wrong is grey. Weak or reversed motors and
+other faults of a GPS are paler or darker.
 """
 
 

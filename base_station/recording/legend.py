@@ -13,7 +13,7 @@ ROWS = 8  # more do not fit beside the arena
 MARGIN = 0.17  # of the arena's width, between it and the middle of an entry
 SIZE = 0.13  # radius of a sign, of the distance between two
 WELL = "if all is well"
-OTHERS = "paler, darker: see Log"
+OTHERS = "others: paler"
 
 
 def log_legend(stream: Any, view: StationView) -> None:

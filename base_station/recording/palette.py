@@ -2,7 +2,7 @@
 
 The hues are Okabe and Ito's, which people with any kind of colour blindness can tell apart.
 Vehicles and hypotheses share none. Broken motors are warm, broken GPS is cool, nothing is grey.
-Explanations that are likely beforehand have a hue to themselves, others a paler or darker one.
+Explanations that are likely beforehand have a hue to themselves, others a paler one, the rarest a darker one.
 """
 
 from collections.abc import Sequence
@@ -28,8 +28,8 @@ BLACK: Rgb = (0, 0, 0)
 LAVENDER: Rgb = (206, 196, 255)
 DIM: Rgb = (110, 116, 126)
 LIGHT_GREY: Rgb = (200, 200, 200)
-GREY: Rgb = (150, 150, 150)
-DARK_GREY: Rgb = (100, 100, 100)
+GREY: Rgb = (122, 122, 122)
+DARK_GREY: Rgb = (84, 84, 84)
 
 TRUTH = WHITE
 THRESHOLD = WHITE
@@ -50,8 +50,8 @@ _HYPOTHESES: dict[str, Rgb] = {
     "gps_stuck": LAVENDER,
     "gps_offset": mix(BLUE, WHITE, 0.45),
     "gps_drift": mix(PURPLE, WHITE, 0.5),
-    "gps_noise": mix(PURPLE, BLACK, 0.4),
-    "gps_delay": mix(BLUE, BLACK, 0.25),
+    "gps_noise": mix(PURPLE, BLACK, 0.25),
+    "gps_delay": mix(BLUE, BLACK, 0.35),
     "none": GREY,
     "unknown": DARK_GREY,
 }

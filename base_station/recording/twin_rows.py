@@ -18,6 +18,7 @@ SIGMAS = 2.0  # half size of a spot
 MIN_SPOT_M = 0.03  # so that a certain prediction is still seen
 ELSEWHERE_M = 0.02  # a twin's report is drawn where it is off its body, or uncertain
 LINE_FROM, LINE_TO = 0.01, 0.001  # a posterior's line begins at the one, ends below the other
+LIKELY_M = 0.009  # a likelier twin's ring lies this much higher: it is not covered by others
 SLOW_S = 0.5  # between rows of the belief while there is no doubt
 EARLY_S = 1e-6
 FLOOR_NATS = -50.0  # further behind the best makes no difference
@@ -95,7 +96,8 @@ class TwinRows:
         if name not in self._styled:
             self._styled.add(name)
             scene.style_twin(self._stream, name)
-        bodies = [scene.at(n, e, scene.TWIN_Z_M) for n, e in twin.true_m.tolist()]
+        z_m = scene.TWIN_Z_M + LIKELY_M * twin.posterior
+        bodies = [scene.at(n, e, z_m) for n, e in twin.true_m.tolist()]
         rings = [(*place, radius_m) for place, radius_m in zip(bodies, self._radii_m, strict=True)]
         self._batch.add(f"{root}/body", col.RINGS, rings)
         self._batch.add(f"{root}/report", col.SPOTS, _spots(twin, doubted))
