@@ -2,7 +2,8 @@
 
 The hues are Okabe and Ito's, which people with any kind of colour blindness can tell apart.
 Vehicles and hypotheses share none. Broken motors are warm, broken GPS is cool, nothing is grey.
-Explanations that are likely beforehand have a hue to themselves, others a paler one, the rarest a darker one.
+Explanations that are likely beforehand have a hue to themselves, others a paler one, the rarest a
+darker one.
 """
 
 from collections.abc import Sequence

@@ -1,6 +1,6 @@
 """Replay: a stored log of a rescue still gives the decisions of then; and what differs is said.
 
-The log is one of `hil run scenarios/rescue.yaml --in-memory`: `tests/data/keep_rescue.py` renews it.
+The log is of `hil run scenarios/rescue.yaml --in-memory`; `tests/data/keep_rescue.py` renews it.
 """
 
 import lzma
