@@ -86,7 +86,7 @@ class Fleet:
         frames: list[Frame] = []
         while self._is_due(self._next_tick * self.period_s):
             time_s = self._next_tick * self.period_s
-            waited_s = self.newest_s - time_s
+            waited_s = min(self.newest_s - time_s, WAIT_FOR_LATE_S)
             delays_s = [waited_s + track.round_trip_s for track in self.tracks]
             pairs = zip(self.tracks, self._autopilots, strict=True)
             driven = [t.mode_at(time_s - self.period_s) == a.driven_mode for t, a in pairs]
