@@ -1,12 +1,14 @@
 """The page that says what run this is, how to read it and what came out (Markdown)."""
 
 import platform
+from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 
 from base_station.records import Event
 from hil.scenario import StationView
 
 PACKAGES = ("hil-fleet", "rerun-sdk", "numpy", "torch", "stable-baselines3", "pymavlink")
+SHOWN_FROM = 5e-4  # explanations less likely than this are summed up in one row
 KEPT = frozenset({"anomaly", "verdict", "goal", "takeover", "end"})
 
 LEGEND = """\
@@ -24,6 +26,14 @@ One colour per vehicle and one per hypothesis, the same in all views. Dead motor
 red, a stuck GPS is purple, blue and lavender, nothing wrong is grey. Weak or reversed motors and
 other faults of a GPS are paler or darker.
 """
+
+
+def ranked(posterior: Mapping[str, float]) -> list[tuple[str, float]]:
+    """Explanations, the likeliest first; those that hardly count are one row, 'all others'."""
+    falling = sorted(posterior.items(), key=lambda item: -item[1])
+    shown = [(name, p) for name, p in falling if p >= SHOWN_FROM]
+    rest = falling[len(shown) :]
+    return [*shown, ("all others", sum(p for _, p in rest))] if rest else shown
 
 
 class Brief:
@@ -58,9 +68,8 @@ class Brief:
         posterior = event.data.get("posterior")
         rows = ""
         if isinstance(posterior, dict):
-            ranked = sorted(posterior.items(), key=lambda item: -item[1])
             rows = "\n\n| Hypothesis | Posterior |\n|---|---|\n" + "\n".join(
-                f"| {name} | {p:.4f} |" for name, p in ranked
+                f"| {name} | {p:.4f} |" for name, p in ranked(posterior)
             )
         return f"## Verdict\n\n**{event.text}**{rows}"
 

@@ -79,7 +79,8 @@ class LearningRows:
         if foreseen is None or foreseen.reports_m is self._reports_m:
             return
         self._reports_m = foreseen.reports_m
-        self._wipe([path for path in self._drawn if path.startswith("/plan/alpha/")])
+        new = {f"/plan/alpha/{name}" for name in foreseen.hypotheses}
+        self._wipe([p for p in self._drawn if p.startswith("/plan/alpha/") and p not in new])
         pairs = zip(foreseen.hypotheses, foreseen.reports_m, strict=True)
         for k, (name, report_m) in enumerate(pairs):
             strips = _strips(report_m, scene.PLAN_Z_M + LAYER_M * k)

@@ -139,6 +139,18 @@ def test_phases_change_when_the_events_say_so(folder: Path, rrd: Path) -> None:
     assert found == told[-len(found) :]
 
 
+def test_every_experiment_is_drawn_before_it_is_driven(folder: Path, rrd: Path) -> None:
+    """The suspect alone, and then contact; a plan is on the plane before the first arrow is."""
+    begun_s = [e["time_s"] for e in lines(folder / "events.jsonl") if e["text"] == "experiment"]
+    plans = [e for e in entities(rrd) if e.startswith("/plan/alpha/")]
+    drawn_s = {t for e in plans for t, ways in temporal(rrd, e, "LineStrips3D:strips") if ways}
+    arrows_s = [t for t, arrows in temporal(rrd, "/setpoint", "Arrows3D:vectors") if arrows]
+    assert len(drawn_s) == len(begun_s) == 2
+    for planned_s, start_s in zip(sorted(drawn_s), begun_s, strict=True):
+        assert planned_s == pytest.approx(start_s, abs=0.05)
+        assert planned_s < next(t for t in arrows_s if t >= planned_s)
+
+
 def test_plan_beta_is_there_before_it_is_driven(folder: Path, rrd: Path) -> None:
     (planned_s, [*ways]) = temporal(rrd, "/plan/beta", "LineStrips3D:strips")[0]
     begun_s = [e["time_s"] for e in lines(folder / "events.jsonl") if e["text"] == "mission"]

@@ -1,6 +1,7 @@
 """The recorder: what the station tells is in the recording, with its values and times."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,11 +14,12 @@ from recorder_reading import Rows, entities, rows, temporal
 from rerun.chunk import RrdReader
 
 from base_station.recorder import Recorder
+from base_station.recording.brief import ranked
 from base_station.recording.merge import merge
 from base_station.recording.scene import NOSE_AT, hypotheses
 from base_station.recording.truth import TruthRecorder
 from base_station.recording.twin_rows import LINE_TO
-from base_station.records import Snapshot
+from base_station.records import Foreseen, Snapshot
 from benchmarks import recorder as crowd
 from hil.frames import wgs84_to_ned
 from hil.scenario import Geofence
@@ -283,6 +285,35 @@ def test_plan_alpha_is_drawn_per_hypothesis_until_the_mission(recording: Path) -
         paths_m = plan.predicted_reports[k].transpose(1, 0, 2)[..., ::-1]
         assert np.array(strips)[..., :2] == pytest.approx(paths_m, abs=1e-6)
         assert (cleared_s, nothing) == (29.0, [])
+
+
+def test_an_experiment_is_drawn_instead_of_the_one_before(tmp_path: Path) -> None:
+    """First the suspect alone, under three explanations, then contact, under two."""
+    first = replace(next(fake.snapshots()), phase="experiment")
+    alone = Foreseen(fake.NAMES[:3], np.zeros((3, 5, 3, 2)))
+    contact = Foreseen(fake.NAMES[1:3], np.ones((2, 9, 3, 2)))
+    recorder = Recorder(tmp_path / "a.rrd", "demo", fake.view())
+    for time_s, foreseen in ((1.0, alone), (1.1, alone), (2.0, contact), (2.1, None)):
+        recorder.snapshot(replace(first, time_s=time_s, foreseen=foreseen))
+    recorder.close()
+    drawn = {
+        name: [
+            (time_s, [len(way) for way in ways])
+            for time_s, ways in temporal(
+                tmp_path / "a.rrd", f"/plan/alpha/{name}", "LineStrips3D:strips"
+            )
+        ]
+        for name in fake.NAMES[:3]
+    }
+    assert drawn["motor_x_off"] == [(1.0, [5] * 3), (2.0, [])]
+    for name in fake.NAMES[1:3]:
+        assert drawn[name] == [(1.0, [5] * 3), (2.0, [9] * 3)]
+
+
+def test_what_hardly_counts_is_one_row() -> None:
+    posterior = {"a": 0.0002, "b": 0.7, "c": 0.2994, "d": 0.0004}
+    assert ranked(posterior) == [("b", 0.7), ("c", 0.2994), ("all others", pytest.approx(0.0006))]
+    assert ranked({"b": 1.0}) == [("b", 1.0)]
 
 
 def test_plan_beta_is_drawn_per_vehicle_before_it_is_driven(recording: Path) -> None:

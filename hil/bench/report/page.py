@@ -4,6 +4,7 @@ import base64
 from html import escape
 from typing import Any
 
+from base_station.recording.brief import ranked
 from base_station.recording.palette import hypothesis_color
 from hil.bench.report.record import RunTold
 
@@ -28,6 +29,7 @@ CAPTIONS = {
     ),
     "timings": ("What took how long", "Fleet time is the vehicles' clock, wall time the people's."),
 }
+LIKELY = 0.02
 KEPT = ("fault", "anomaly", "hypotheses", "plan", "contact", "verdict", "goal", "takeover", "end")
 STYLE = """
 :root { color-scheme: dark }
@@ -89,8 +91,8 @@ def _verdict(run: RunTold) -> str:
     else:
         what = verdict["hypothesis"] if verdict["decided"] else "cannot tell"
         said = f"{names.get(verdict['sysid'], verdict['sysid'])}: {what}"
-        ranked = sorted(verdict["posterior"].items(), key=lambda item: -item[1])
-        rows = f"<table>{''.join(_probability(name, p) for name, p in ranked)}</table>"
+        rows = "".join(_probability(name, p) for name, p in ranked(verdict["posterior"]))
+        rows = f"<table>{rows}</table>"
     truths = [f"{names[int(s)]}: {h}" for s, h in result["truth"]["hypotheses"].items()]
     truth = ", ".join(truths) or "nothing was broken"
     badge = _badge(result["correct"], "correct", "not correct")
@@ -101,20 +103,24 @@ def _verdict(run: RunTold) -> str:
 
 
 def _why(run: RunTold) -> str:
-    """The odds before the experiment, and the touch that changed them."""
+    """The odds before the experiments, and what changed them: a touch, or the suspect alone."""
     if not (run.of("hypotheses") and run.of("verdict")):
         return ""
     before, verdict = run.of("hypotheses")[-1], run.of("verdict")[-1]
-    ranked = sorted(before["data"]["posterior"].items(), key=lambda item: -item[1])
-    likely = " and ".join(f"{name} {p:.2f}" for name, p in ranked if p >= 0.02)
+    posterior = ranked(before["data"]["posterior"])
+    likely = ", ".join(f"{name} {p:.2f}" for name, p in posterior if p >= LIKELY)
     touches = [c for c in run.contacts if before["time_s"] <= c.start_s <= verdict["time_s"]]
-    words = f"Before the experiment: {likely}."
-    if touches and verdict["data"]["decided"]:
+    words = f"Before any experiment: {likely}."
+    if not verdict["data"]["decided"]:
+        return f"<p>{escape(words)}</p>"
+    if touches:
         first = touches[0]
         words += (
             f" At {first.start_s:.1f} s {first.bodies[0]} and {first.bodies[1]} met; what "
             "was reported then fits one explanation only."
         )
+    elif any(before["time_s"] <= e["time_s"] <= verdict["time_s"] for e in run.of("plan")):
+        words += " Driven alone, it answered as one explanation only expects."
     return f"<p>{escape(words)}</p>"
 
 
