@@ -28,7 +28,7 @@ from base_station.recording.palette import (
 from hil.airframe import Airframe
 from hil.faults import Type
 from hil.frames import ned_to_wgs84
-from hil.scenario import Rectangle, StationView
+from hil.scenario import Obstacle, Rectangle, StationView
 
 GROUND_Z_M, TRUTH_Z_M, TWIN_Z_M, REPORT_Z_M, PLAN_Z_M, ARROW_Z_M = 0.0, 0.03, 0.05, 0.06, 0.07, 0.1
 DISC_M = 0.02  # height
@@ -74,11 +74,29 @@ def circle(north_m: float, east_m: float, radius_m: float, z_m: float) -> list[P
     ]
 
 
+def _rim(obstacle: Obstacle) -> list[Point3]:
+    """A closed line: half a circle around each end."""
+    a, b = obstacle.ends
+    first = math.atan2(b.east_m - a.east_m, b.north_m - a.north_m) - 0.5 * math.pi
+    ring = [
+        at(
+            p.north_m + obstacle.radius_m * math.cos(first + turn),
+            p.east_m + obstacle.radius_m * math.sin(first + turn),
+        )
+        for p, half in ((b, range(17)), (a, range(16, 33)))
+        for turn in (math.pi * k / 16 for k in half)
+    ]
+    return [*ring, ring[0]]
+
+
 def log_scene(stream: Any, view: StationView) -> None:
     """Everything that is known before the first message."""
     stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     outline = rr.LineStrips3D([_outline(view.arena)], colors=DIM, radii=0.02)
     stream.log("/plane/arena", outline, static=True)
+    if view.obstacles:
+        rims = rr.LineStrips3D([_rim(o) for o in view.obstacles], colors=DIM, radii=0.02)
+        stream.log("/plane/obstacles", rims, static=True)
     if view.geofence:
         dashes = rr.LineStrips3D(_dashes(view.geofence), colors=LIGHT_GREY, radii=0.015)
         stream.log("/plane/geofence", dashes, static=True)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from base_station.hypotheses import Hypothesis
 from hil.airframe import Airframe, Motor
 from hil.faults import NED_AXES, Type, Unit
-from hil.scenario import Rectangle, StationView
+from hil.scenario import Obstacle, Rectangle, StationView
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -104,7 +104,7 @@ class FleetModel:
             turn_line=np.array([_turn(f)[0] for f in frames]),
             turn_scrub=np.array([_turn(f)[1] for f in frames]),
             bounds_m=_bounds_m(view.arena),
-            obstacles_m=np.empty((0, 5)),
+            obstacles_m=_strokes_m(view.obstacles),
             reach_m=2.0 * fastest_mps / view.clock.autopilot_hz,
             yaw_locked=view.yaw == "locked",
             dt_s=1.0 / view.clock.autopilot_hz,
@@ -192,6 +192,16 @@ def fault_rows(model: FleetModel, hypotheses: Sequence[Hypothesis]) -> FaultArra
 
 def _bounds_m(area: Rectangle) -> Array:
     return np.array([area.north_min_m, area.north_max_m, area.east_min_m, area.east_max_m])
+
+
+def _strokes_m(obstacles: Sequence[Obstacle]) -> Array:
+    """[O, 5], as the kernel wants them."""
+    rows = [
+        (a.north_m, a.east_m, b.north_m, b.east_m, obstacle.radius_m)
+        for obstacle in obstacles
+        for a, b in [obstacle.ends]
+    ]
+    return np.array(rows, dtype=np.float64).reshape(-1, 5)
 
 
 def _padded(rows: Sequence[object], length: int, fill: float = 0.0) -> Array:

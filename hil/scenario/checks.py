@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from hil.airframe import Airframe
-from hil.scenario.places import Arena, Geofence, Point, Rectangle
+from hil.scenario.places import Arena, Geofence, Obstacle, Point, Rectangle
 
 
 class Member(Protocol):
@@ -49,3 +49,14 @@ def check_fence(
             )
     for field in fields:
         keep_inside(fence, field, fleet)
+
+
+def keep_clear(obstacles: Sequence[Obstacle], field: str, fleet: Sequence[Member]) -> None:
+    for i, v in enumerate(fleet):
+        for k, obstacle in enumerate(obstacles):
+            room_m = obstacle.distance_m(getattr(v, field))
+            if room_m < v.frame.radius_m:
+                raise ValueError(
+                    f"fleet.{i}.{field} of {v.name} is {room_m:.2f} m from obstacles.{k}; its "
+                    f"radius of {v.frame.radius_m} m is needed: move one of them"
+                )

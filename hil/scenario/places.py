@@ -1,6 +1,7 @@
 """Where things are, and what everybody there has to live with: clock, wind, slope."""
 
 import itertools
+import math
 from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -52,6 +53,32 @@ class Geofence(Rectangle):
 class Point(Model):
     north_m: Metres
     east_m: Metres
+
+
+class Obstacle(Model):
+    """Something solid: a disc around `at`, or with `to` a wall between both, with round ends."""
+
+    at: Point
+    to: Point | None = None
+    radius_m: Annotated[float, Field(gt=0.0, le=1000.0, allow_inf_nan=False)]
+
+    @property
+    def ends(self) -> tuple[Point, Point]:
+        """Equal for a disc."""
+        return self.at, self.to or self.at
+
+    def distance_m(self, point: Point) -> float:
+        """From its surface; negative inside."""
+        a, b = self.ends
+        north_m, east_m = b.north_m - a.north_m, b.east_m - a.east_m
+        along = (point.north_m - a.north_m) * north_m + (point.east_m - a.east_m) * east_m
+        square = north_m**2 + east_m**2
+        share = max(0.0, min(1.0, along / square)) if square > 0.0 else 0.0
+        nearest_m = (a.north_m + share * north_m, a.east_m + share * east_m)
+        return math.dist(nearest_m, (point.north_m, point.east_m)) - self.radius_m
+
+
+Obstacles = Annotated[tuple[Obstacle, ...], Field(max_length=100)]
 
 
 class Clock(Model):

@@ -6,11 +6,11 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hil.scenario.checks import check_fence, keep_inside, unique
+from hil.scenario.checks import check_fence, keep_clear, keep_inside, unique
 from hil.scenario.faults import FaultModel
 from hil.scenario.fields import MAX_PORT, PORTS_PER_VEHICLE, Model, Seed
 from hil.scenario.mission import Diagnosis, Expectation, Limits, Links, Planning
-from hil.scenario.places import Arena, Clock, Geofence, OriginModel, Terrain
+from hil.scenario.places import Arena, Clock, Geofence, Obstacles, OriginModel, Terrain
 from hil.scenario.vehicles import Plant, Radios, Sensors, Vehicle
 
 
@@ -21,6 +21,7 @@ class Scenario(Model):
     origin: OriginModel = OriginModel()
     arena: Arena
     geofence: Geofence | None = None
+    obstacles: Obstacles = ()
     yaw: Literal["locked", "free"] = "locked"
     clock: Clock = Clock()
     fleet: Annotated[tuple[Vehicle, ...], Field(min_length=1, max_length=100)]
@@ -49,6 +50,8 @@ class Scenario(Model):
         keep_inside(self.arena, "start", self.fleet)
         keep_inside(self.arena, "goal", self.fleet)
         check_fence(self.geofence, self.arena, ("start", "goal"), self.fleet)
+        keep_clear(self.obstacles, "start", self.fleet)
+        keep_clear(self.obstacles, "goal", self.fleet)
         for v in self.fleet:
             if self.yaw == "locked" and not v.frame.axis_motors("y") and not v.frame.flight:
                 raise ValueError(

@@ -8,7 +8,7 @@ from hil import airframe as airframes
 from hil.airframe import Airframe
 from hil.connection import Connection, parse_connection
 from hil.errors import InputError
-from hil.scenario.checks import check_fence, keep_inside, unique
+from hil.scenario.checks import check_fence, keep_clear, keep_inside, unique
 from hil.scenario.fields import (
     PORTS_PER_VEHICLE,
     AutopilotName,
@@ -24,7 +24,7 @@ from hil.scenario.fields import (
     VehicleName,
 )
 from hil.scenario.mission import Diagnosis, Limits, Planning
-from hil.scenario.places import Arena, Clock, Geofence, OriginModel, Point
+from hil.scenario.places import Arena, Clock, Geofence, Obstacles, OriginModel, Point
 from hil.scenario.schema import Scenario
 from hil.scenario.vehicles import Sensors
 
@@ -76,6 +76,7 @@ class StationView(Model):
     origin: OriginModel
     arena: Arena
     geofence: Geofence | None = None
+    obstacles: Obstacles = ()
     yaw: Literal["locked", "free"]
     clock: Clock
     fleet: Annotated[tuple[FleetMember, ...], Field(min_length=1, max_length=100)]
@@ -99,6 +100,7 @@ class StationView(Model):
             raise ValueError(f"station_sysid = {self.station_sysid} is also a vehicle's")
         keep_inside(self.arena, "goal", self.fleet)
         check_fence(self.geofence, self.arena, ("goal",), self.fleet)
+        keep_clear(self.obstacles, "goal", self.fleet)
         return self
 
     def connection_of(self, member: FleetMember) -> Connection:
@@ -144,6 +146,7 @@ def station_view(scenario: Scenario, mavlink_port_base: int, station_seed: int) 
         origin=scenario.origin,
         arena=scenario.arena,
         geofence=scenario.geofence,
+        obstacles=scenario.obstacles,
         yaw=scenario.yaw,
         clock=scenario.clock,
         fleet=fleet,

@@ -21,7 +21,7 @@ from hil.airframe import (
 )
 from hil.frames import body_to_ned, ned_to_body, wrap_pi
 from hil.physics_link import AT_REST_MPS2, PhysicsState, Vector3
-from hil.scenario import Arena, Scenario, Vehicle
+from hil.scenario import Arena, Obstacle, Scenario, Vehicle
 from hil.world.flight import Air, in_body, load_n, step, thrust_ned
 from hil.world.ground import Ground
 from hil.world.plant import real_airframe
@@ -141,6 +141,7 @@ class World:
         self._ambient = ambient(scenario.terrain, 0.0)
         self._changes_s = change_times_s(scenario.terrain)  # those to come
         self._add_walls(scenario.arena)
+        self._add_obstacles(scenario.obstacles)
         self._vehicles = {
             v.sysid: self._add_vehicle(
                 v, real_airframe(v.frame, scenario.plant, seed, v.sysid), scenario.yaw == "locked"
@@ -216,6 +217,13 @@ class World:
         }
         for name, (a, b) in sides.items():
             self._add_shape(pymunk.Segment(self._space.static_body, a, b, t), name, _WALL)
+
+    def _add_obstacles(self, obstacles: Sequence[Obstacle]) -> None:
+        """Walls, too: whoever looks at contacts need not tell them apart."""
+        for k, obstacle in enumerate(obstacles):
+            a, b = ((p.north_m, p.east_m) for p in obstacle.ends)
+            shape = pymunk.Segment(self._space.static_body, a, b, obstacle.radius_m)
+            self._add_shape(shape, f"wall_obstacle_{k}", _WALL)
 
     def _add_shape(self, shape: pymunk.Shape, name: str, collision_type: int) -> None:
         shape.elasticity = 0.0

@@ -65,6 +65,14 @@ BAD_VALUES: dict[str, tuple[Edit, str]] = {
     "empty arena": (lambda t: t["arena"].update(north_max_m=-9.0), "arena is empty"),
     "fence beyond the walls": (lambda t: t.update(geofence=fence(9.0)), "outside the arena"),
     "goal outside the fence": (lambda t: t.update(geofence=fence(0.5)), "outside the geofence"),
+    "start in an obstacle": (
+        lambda t: t.update(obstacles=[{"at": dict(t["fleet"][0]["start"]), "radius_m": 0.5}]),
+        "from obstacles.0",
+    ),
+    "obstacle without a radius": (
+        lambda t: t.update(obstacles=[{"at": dict(t["fleet"][0]["start"]), "radius_m": 0.0}]),
+        "obstacles.0.radius_m",
+    ),
     "fence without an inside": (lambda t: t.update(geofence=fence(-9.0)), "geofence is empty"),
     "fault of a stranger": (lambda t: t["faults"][0].update(vehicle=9), "not in the fleet"),
     "fault of motor 5": (lambda t: t["faults"][0].update(instances=[5]), "the highest is 4"),
