@@ -4,16 +4,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from base_station import execution, mission
-from base_station.diagnosis import Verdict
-from base_station.doubt import Doubt
+from base_station.belief.diagnosis import Verdict
+from base_station.belief.doubt import Doubt
+from base_station.belief.hindsight import Hindsight
+from base_station.belief.hypotheses import Hypothesis, candidates
+from base_station.belief.watch import Watch
 from base_station.execution import Orders
 from base_station.fleet import Fleet
-from base_station.hindsight import Hindsight
-from base_station.hypotheses import Hypothesis, candidates
 from base_station.phases import AnyPhase, Connecting, Finished, Holding, Settling
 from base_station.planning.requests import Kind, PlanReady, PlanRequest
 from base_station.records import Event, EventKind
-from base_station.watch import Watch
 from hil.scenario import StationView
 
 Array = NDArray[np.float64]

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from base_station import twin
+from base_station.belief.hypotheses import Hypothesis, nominal
+from base_station.belief.watch import Watch
 from base_station.execution import Orders
-from base_station.hypotheses import Hypothesis, nominal
 from base_station.planning.policy import Commands, act, arrived, beta_observation, to_setpoints
 from base_station.planning.requests import PolicyWeights
-from base_station.watch import Watch
 from hil.faults import Unit
 from hil.scenario import StationView
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from base_station.belief.hindsight import Hindsight
 from base_station.execution import Orders
-from base_station.hindsight import Hindsight
 from base_station.planning.requests import OpenLoopPlan, PolicyWeights
 from base_station.records import Phase
 

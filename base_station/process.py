@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from base_station import twin
+from base_station.belief.watch import Baseline, Watch
 from base_station.budget import refuse_overload
 from base_station.consent import ask_before_arming
 from base_station.dry import DryEnd
@@ -30,7 +31,6 @@ from base_station.planner_child import PlannerChild
 from base_station.recording.streams import VIEWER
 from base_station.resuming import Resumed, resume
 from base_station.telemetry import Frame
-from base_station.watch import Baseline, Watch
 from base_station.wiring import open_links
 from hil.errors import HilError, InputError
 from hil.mavlink import read_key

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from base_station import doubt as doubts
+from base_station.belief import doubt as doubts
 from base_station.desk import Desk
 from base_station.execution import Orders
 from base_station.overheard import join, on_one_clock, others_drove

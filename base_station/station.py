@@ -8,8 +8,8 @@ orders into commands.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from base_station import doubt as doubts
 from base_station.autopilots import Rate
+from base_station.belief import doubt as doubts
 from base_station.commander import Commander
 from base_station.commands import AskTime, Command, Drive, Heartbeat
 from base_station.desk import Desk

@@ -32,7 +32,7 @@ from twin_rivals import (
     vmas_rovers,
 )
 
-from base_station.hypotheses import nominal
+from base_station.belief.hypotheses import nominal
 from base_station.twin import EAST, NORTH, FleetModel, advance_in_place, fault_rows, initial_state
 from hil.airframe import OMNI_PLUS
 from hil.scenario import load_scenario, station_view

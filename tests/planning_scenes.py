@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from base_station.hypotheses import candidates, nominal
+from base_station.belief.hypotheses import candidates, nominal
 from base_station.planning.requests import PlanRequest
 from base_station.twin import initial_state
 from hil.scenario import StationView

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from base_station.hypotheses import nominal
+from base_station.belief.hypotheses import nominal
 from base_station.twin import EAST, NORTH, FleetModel, advance, fault_rows, initial_state, perturbed
 from hil.airframe import output_to_pwm
 from hil.scenario import Scenario, station_view

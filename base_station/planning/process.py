@@ -14,7 +14,7 @@ from typing import TextIO
 
 import numpy as np
 
-from base_station.hypotheses import SIZES, candidates
+from base_station.belief.hypotheses import SIZES, candidates
 from base_station.planning.attempts import Attempts
 from base_station.planning.learning import ppo
 from base_station.planning.learning.lesson import Lesson

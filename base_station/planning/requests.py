@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.hypotheses import Hypothesis
+from base_station.belief.hypotheses import Hypothesis
 from hil.faults import Fault, Type, Unit
 
 Array = NDArray[np.float64]

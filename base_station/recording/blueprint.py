@@ -5,7 +5,7 @@ from typing import Any
 
 import rerun.blueprint as rrb
 
-from base_station.hypotheses import UNKNOWN
+from base_station.belief.hypotheses import UNKNOWN
 from base_station.recording.columns import SIM_TIME, WALL_TIME
 from base_station.recording.legend import MARGIN
 from base_station.recording.scene import TWIN_TRAILS, hypotheses

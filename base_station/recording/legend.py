@@ -4,7 +4,7 @@ from typing import Any
 
 import rerun as rr
 
-from base_station.hypotheses import NONE
+from base_station.belief.hypotheses import NONE
 from base_station.recording.palette import LIGHT_GREY, TRUTH, WHITE, hypothesis_color, vehicle_color
 from base_station.recording.scene import DISC_M, GROUND_Z_M, at, circle, usual
 from hil.scenario import StationView

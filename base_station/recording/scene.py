@@ -11,7 +11,7 @@ from typing import Any
 
 import rerun as rr
 
-from base_station.hypotheses import NONE, candidates
+from base_station.belief.hypotheses import NONE, candidates
 from base_station.recording.columns import RING_M
 from base_station.recording.palette import (
     BLACK,

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from base_station.hypotheses import UNKNOWN
+from base_station.belief.hypotheses import UNKNOWN
 from base_station.recording import columns as col
 from base_station.recording import scene
 from base_station.recording.palette import hypothesis_color

@@ -2,17 +2,18 @@
 
 from dataclasses import asdict, replace
 
-from base_station import doubt as doubts
-from base_station import escalation, execution
+from base_station import execution
+from base_station.belief import doubt as doubts
+from base_station.belief import escalation
+from base_station.belief.diagnosis import Verdict
+from base_station.belief.hypotheses import NONE, UNKNOWN
+from base_station.belief.watch import Watch
 from base_station.desk import Desk
-from base_station.diagnosis import Verdict
 from base_station.execution import Orders
-from base_station.hypotheses import NONE, UNKNOWN
 from base_station.phases import Concluding, Experimenting, PlanningAlpha, Settling
 from base_station.planning.requests import OpenLoopPlan
 from base_station.steps.travelling import request_beta
 from base_station.telemetry import Frame
-from base_station.watch import Watch
 
 EXPERIMENT_MIN_S = 1.0
 MOMENTS_PER_TICK = 4  # of the memory, each about 2 ms: a step must not take 10 ms

@@ -1,6 +1,7 @@
 """[0a]: is everybody there, and does everybody answer as its twin does?"""
 
 from base_station import execution, twin
+from base_station.belief.watch import Baseline, Watch
 from base_station.commander import Commander
 from base_station.commands import Command
 from base_station.desk import Desk
@@ -8,7 +9,6 @@ from base_station.execution import Orders
 from base_station.phases import Arming, Connecting, Probing
 from base_station.steps.travelling import request_beta
 from base_station.telemetry import Frame
-from base_station.watch import Baseline, Watch
 
 
 def get_ready(desk: Desk, commander: Commander) -> list[Command]:

@@ -8,7 +8,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.hypotheses import Hypothesis
+from base_station.belief.hypotheses import Hypothesis
 from hil.airframe import Airframe, Motor
 from hil.faults import NED_AXES, Type, Unit
 from hil.scenario import Obstacle, Rectangle, StationView

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from base_station.autopilots import adapter
-from base_station.hypotheses import candidates
+from base_station.belief.hypotheses import candidates
 from hil.airframe import push_margin
 from hil.bench.firmware import is_foreign, start_of
 from hil.bench.onsets import Onsets

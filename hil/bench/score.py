@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from base_station.hypotheses import NONE, UNKNOWN, candidates
+from base_station.belief.hypotheses import NONE, UNKNOWN, candidates
 from hil.bench.labels import expected_hypothesis
 from hil.bench.lines import Outcome, Verdict
 from hil.bench.record import RunRecord, Struck

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from base_station.hypotheses import candidates
+from base_station.belief.hypotheses import candidates
 from base_station.planning.tasks.evaluation import (
     INVALID,
     MODEL_ERROR,

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from base_station.hypotheses import candidates, nominal
+from base_station.belief.hypotheses import candidates, nominal
 from base_station.planning.actors import Gaussian
 from base_station.planning.attempts import derived_seed
 from base_station.planning.foresight import way

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from base_station.hypotheses import Hypothesis
+from base_station.belief.hypotheses import Hypothesis
 from base_station.planning.requests import (
     OpenLoopPlan,
     PlanProgress,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from base_station import detection
+from base_station.belief import detection
 
 
 def _first_alarm(residuals: np.ndarray, threshold: float) -> int | None:

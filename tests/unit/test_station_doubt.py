@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from base_station import doubt as doubts
-from base_station import escalation, twin
-from base_station.diagnosis import SAMPLE_PERIOD_S
+from base_station import twin
+from base_station.belief import doubt as doubts
+from base_station.belief import escalation
+from base_station.belief.diagnosis import SAMPLE_PERIOD_S
+from base_station.belief.hindsight import Hindsight
+from base_station.belief.hypotheses import Hypothesis, candidates, nominal
+from base_station.belief.particles import report_faults
+from base_station.belief.watch import Baseline, Watch
 from base_station.execution import Orders, hold, plan_orders, probe_pulses, pulse_at, pulse_orders
-from base_station.hindsight import Hindsight
-from base_station.hypotheses import Hypothesis, candidates, nominal
-from base_station.particles import report_faults
 from base_station.telemetry import Frame
-from base_station.watch import Baseline, Watch
 from hil.scenario import StationView
 
 PERIOD_S = 0.1

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from base_station import hearing
+from base_station.belief import hearing
+from base_station.belief.hearing import Hearing
 from base_station.execution import Orders
-from base_station.hearing import Hearing
 from base_station.telemetry import Frame, Sample, Track
 
 DRAWS, VEHICLES, PERIOD_S = 400, 2, 0.1

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from base_station.hypotheses import NONE, Hypothesis
+from base_station.belief.hypotheses import NONE, Hypothesis
 from base_station.twin import (
     EAST,
     NORTH,

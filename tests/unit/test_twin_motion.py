@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from base_station.hypotheses import NONE, Hypothesis
+from base_station.belief.hypotheses import NONE, Hypothesis
 from base_station.twin import (
     DRIVEN,
     EAST,

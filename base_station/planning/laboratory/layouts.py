@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.hypotheses import candidates
+from base_station.belief.hypotheses import candidates
 from base_station.planning.requests import PlanRequest
 from base_station.twin import initial_state
 from hil.scenario import StationView

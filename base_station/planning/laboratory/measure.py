@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.hypotheses import candidates, nominal
+from base_station.belief.hypotheses import candidates, nominal
 from base_station.planning.attempts import derived_seed
 from base_station.planning.laboratory import layouts
 from base_station.planning.laboratory.changes import changed_mission, changed_problem, changed_view

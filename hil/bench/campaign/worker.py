@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-from base_station.hypotheses import candidates
+from base_station.belief.hypotheses import candidates
 from base_station.planning.planner import plan
 from base_station.planning.requests import PlanProgress, PlanReady, PlanRequest
 from hil.bench.campaign.plan import RunSpec

@@ -10,14 +10,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station import diagnosis, hearing, observer, particles, twin
-from base_station.diagnosis import Fit, ReportFaults, Verdict
+from base_station import twin
+from base_station.belief import diagnosis, hearing, observer, particles
+from base_station.belief.diagnosis import Fit, ReportFaults, Verdict
+from base_station.belief.hearing import Hearing
+from base_station.belief.hypotheses import Hypothesis
+from base_station.belief.particles import DRAWS, Particles
+from base_station.belief.watch import CORRECTION_TIME_S, Baseline
 from base_station.execution import Orders
-from base_station.hearing import Hearing
-from base_station.hypotheses import Hypothesis
-from base_station.particles import DRAWS, Particles
 from base_station.telemetry import Frame
-from base_station.watch import CORRECTION_TIME_S, Baseline
 from hil.faults import Type, Unit
 
 Array = NDArray[np.float64]

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from base_station import twin
-from base_station.doubt import Doubt
-from base_station.hypotheses import Hypothesis
+from base_station.belief.doubt import Doubt
+from base_station.belief.hypotheses import Hypothesis
 from base_station.planning.requests import OpenLoopPlan
 from hil.faults import Type, Unit
 from hil.frames import body_to_ned

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station import detection, observer, twin
+from base_station import twin
+from base_station.belief import detection, observer
+from base_station.belief.hypotheses import NONE, Hypothesis
 from base_station.execution import Orders
-from base_station.hypotheses import NONE, Hypothesis
 from base_station.telemetry import Frame
 from hil.faults import Type, Unit
 from hil.scenario import StationView

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from base_station import twin
-from base_station.diagnosis import ReportFaults
-from base_station.hypotheses import SIZES, Hypothesis
-from base_station.watch import Baseline
+from base_station.belief.diagnosis import ReportFaults
+from base_station.belief.hypotheses import SIZES, Hypothesis
+from base_station.belief.watch import Baseline
 from hil.faults import Type, Unit
 
 Array = NDArray[np.float64]

@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station import hearing, twin
+from base_station import twin
+from base_station.belief import hearing
+from base_station.belief.hearing import Hearing
 from base_station.execution import Orders
-from base_station.hearing import Hearing
 from base_station.telemetry import Frame
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.hypotheses import Hypothesis
+from base_station.belief.hypotheses import Hypothesis
 
 Array = NDArray[np.float64]
 

@@ -10,11 +10,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station import diagnosis, hearing, particles, twin
-from base_station.diagnosis import ReportFaults
-from base_station.doubt import Doubt, advanced
-from base_station.hypotheses import NONE, Hypothesis
-from base_station.watch import Baseline, Moment
+from base_station import twin
+from base_station.belief import diagnosis, hearing, particles
+from base_station.belief.diagnosis import ReportFaults
+from base_station.belief.doubt import Doubt, advanced
+from base_station.belief.hypotheses import NONE, Hypothesis
+from base_station.belief.watch import Baseline, Moment
 
 Array = NDArray[np.float64]
 
