@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from base_station.autopilots import adapter
 from base_station.commands import Arm, Command, Drive, SetMode
 from base_station.execution import Orders
-from base_station.telemetry import Status, Track
+from base_station.receiving.telemetry import Status, Track
 from hil.mavlink import stick
 from hil.scenario import StationView
 

@@ -10,9 +10,9 @@ from base_station.belief.hindsight import Hindsight
 from base_station.belief.hypotheses import Hypothesis, candidates
 from base_station.belief.watch import Watch
 from base_station.execution import Orders
-from base_station.fleet import Fleet
 from base_station.phases import AnyPhase, Connecting, Finished, Holding, Settling
 from base_station.planning.requests import Kind, PlanReady, PlanRequest
+from base_station.receiving.fleet import Fleet
 from base_station.records import Event, EventKind
 from hil.scenario import StationView
 

@@ -15,8 +15,8 @@ from base_station import execution
 from base_station.desk import Desk
 from base_station.execution import Orders
 from base_station.phases import AnyPhase, Concluding, Experimenting, OnMission, Probing
+from base_station.receiving.telemetry import Frame
 from base_station.steps.travelling import plan_from_here
-from base_station.telemetry import Frame
 
 GAP_S = 1.0  # of fleet time without reports
 SETPOINT_KEPT_S = 3.0  # an autopilot forgets a set-point that is older (ArduPilot: GUIDED)

@@ -9,13 +9,13 @@ from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 from base_station.commands import Command, encode
+from base_station.field.safety import disarm_all, stop_all
 from base_station.journal import Datagrams, Inputs
 from base_station.listening import Listener, Listeners
 from base_station.outcome import PhaseTimes, outcome, training
 from base_station.planning.requests import PlanProgress, PlanReady, PlanRequest
 from base_station.records import Event
 from base_station.refusals import Refusals
-from base_station.safety import disarm_all, stop_all
 from base_station.station import Outputs, Station
 from hil.link import Link
 from hil.mavlink import COMPONENT_GCS, Decoder, Encoder, Received, Signing, ticks

@@ -19,18 +19,18 @@ import numpy as np
 
 from base_station import twin
 from base_station.belief.watch import Baseline, Watch
-from base_station.budget import refuse_overload
-from base_station.consent import ask_before_arming
-from base_station.dry import DryEnd
 from base_station.execution import hold
+from base_station.field.budget import refuse_overload
+from base_station.field.consent import ask_before_arming
+from base_station.field.dry import DryEnd
+from base_station.field.keys import Typed, emergency_key
 from base_station.journal import Head, Journal, journal_files
-from base_station.keys import Typed, emergency_key
 from base_station.listeners import open_listeners
 from base_station.node import StationNode
 from base_station.planner_child import PlannerChild
+from base_station.receiving.telemetry import Frame
 from base_station.recording.streams import VIEWER
 from base_station.resuming import Resumed, resume
-from base_station.telemetry import Frame
 from base_station.wiring import open_links
 from hil.errors import HilError, InputError
 from hil.mavlink import read_key

@@ -24,12 +24,12 @@ from base_station.phases import (
     Settling,
 )
 from base_station.planning.requests import OpenLoopPlan
+from base_station.receiving.telemetry import Frame
 from base_station.records import Event, EventKind
 from base_station.sent import SentOrders, sent_orders
 from base_station.station import Station
 from base_station.steps.diagnosing import conclude, settle
 from base_station.steps.probing import probe
-from base_station.telemetry import Frame
 from hil import mavlink
 from hil.scenario import StationView
 

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from base_station import execution
 from base_station.autopilots import Autopilot, adapter
 from base_station.execution import Orders
-from base_station.fleet import Fleet
+from base_station.receiving.fleet import Fleet
 from hil import mavlink
 from hil.frames import body_to_ned
 from hil.scenario import StationView

@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from base_station import twin
 from base_station.desk import Desk
 from base_station.phases import Concluding, Experimenting, OnMission, Probing, Returning
+from base_station.receiving.telemetry import Frame
 from base_station.records import Foreseen, Snapshot, TwinSnapshot, VehicleSnapshot
-from base_station.telemetry import Frame
 
 Array = NDArray[np.float64]
 

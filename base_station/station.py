@@ -14,7 +14,7 @@ from base_station.commander import Commander
 from base_station.commands import AskTime, Command, Drive, Heartbeat
 from base_station.desk import Desk
 from base_station.execution import Orders
-from base_station.fleet import LINK_LOST_WALL_S
+from base_station.field.safety import Held, permitted
 from base_station.gaps import GAP_S, Gap, bridge, out_of_touch_since_s
 from base_station.phases import (
     Arming,
@@ -29,14 +29,14 @@ from base_station.phases import (
     Settling,
 )
 from base_station.planning.requests import PlanReady, PlanRequest
-from base_station.preparing import Preparation
+from base_station.receiving.fleet import LINK_LOST_WALL_S
+from base_station.receiving.preparing import Preparation
+from base_station.receiving.telemetry import Frame
 from base_station.records import Event, Snapshot
-from base_station.safety import Held, permitted
 from base_station.snapshots import snapshot
 from base_station.steps.diagnosing import await_alpha, conclude, experiment, settle
 from base_station.steps.probing import get_ready, probe
 from base_station.steps.travelling import await_beta, drive, go_home
-from base_station.telemetry import Frame
 from hil import mavlink
 from hil.scenario import StationView
 

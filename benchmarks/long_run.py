@@ -22,7 +22,7 @@ from base_station.execution import Orders
 from base_station.journal import Head, Journal
 from base_station.listeners import open_listeners
 from base_station.phases import Probing
-from base_station.telemetry import Frame
+from base_station.receiving.telemetry import Frame
 from hil.bench.folders import blind_view
 from hil.bench.rig import Rig
 from hil.scenario import load_scenario

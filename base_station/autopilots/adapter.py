@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
-from base_station.telemetry import Status
+from base_station.receiving.telemetry import Status
 from hil.airframe import Airframe
 from hil.mavlink import CommandLong, Encoder, MessageId, ParamValue
 

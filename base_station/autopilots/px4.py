@@ -4,7 +4,7 @@ import struct
 from typing import ClassVar
 
 from base_station.autopilots.adapter import Autopilot, Setting
-from base_station.telemetry import Status
+from base_station.receiving.telemetry import Status
 from hil.mavlink import (
     MODE_FLAG_CUSTOM,
     Command,

@@ -3,7 +3,7 @@
 from typing import ClassVar
 
 from base_station.autopilots.adapter import Autopilot, Rate
-from base_station.telemetry import Status
+from base_station.receiving.telemetry import Status
 from hil.mavlink import RoverMode
 
 

@@ -18,7 +18,7 @@ from base_station.belief.hypotheses import Hypothesis
 from base_station.belief.particles import DRAWS, Particles
 from base_station.belief.watch import CORRECTION_TIME_S, Baseline
 from base_station.execution import Orders
-from base_station.telemetry import Frame
+from base_station.receiving.telemetry import Frame
 from hil.faults import Type, Unit
 
 Array = NDArray[np.float64]

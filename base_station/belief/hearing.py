@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from base_station.execution import Orders, hold
-from base_station.telemetry import Frame
+from base_station.receiving.telemetry import Frame
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -15,7 +15,7 @@ from base_station import twin
 from base_station.belief import hearing
 from base_station.belief.hearing import Hearing
 from base_station.execution import Orders
-from base_station.telemetry import Frame
+from base_station.receiving.telemetry import Frame
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -16,7 +16,7 @@ from base_station import twin
 from base_station.belief import detection, observer
 from base_station.belief.hypotheses import NONE, Hypothesis
 from base_station.execution import Orders
-from base_station.telemetry import Frame
+from base_station.receiving.telemetry import Frame
 from hil.faults import Type, Unit
 from hil.scenario import StationView
 

@@ -14,7 +14,7 @@ from base_station.autopilots import adapter
 from base_station.desk import Desk
 from base_station.execution import Orders
 from base_station.phases import Finished
-from base_station.telemetry import Frame
+from base_station.receiving.telemetry import Frame
 from hil.frames import body_to_ned, ned_to_body
 from hil.scenario import FleetMember, StationView
 

@@ -5,8 +5,8 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from base_station.budget import refuse_overload
-from base_station.consent import ask_before_arming
+from base_station.field.budget import refuse_overload
+from base_station.field.consent import ask_before_arming
 from base_station.identify.session import Identification
 from base_station.identify.store import write_fits
 from base_station.node import StationNode

@@ -15,9 +15,9 @@ from base_station.identify.fit import AxisFit, fit_axis
 from base_station.identify.noise import NoiseFit, RestNoise
 from base_station.identify.responses import response_of
 from base_station.planning.requests import PlanProgress, PlanReady
+from base_station.receiving.telemetry import Frame
 from base_station.records import Event, Snapshot
 from base_station.station import Station
-from base_station.telemetry import Frame
 from hil.frames import wgs84_to_ned
 from hil.mavlink import COMPONENT_AUTOPILOT, Decoder, GpsRaw, MessageId
 from hil.scenario import StationView

@@ -12,8 +12,8 @@ from base_station.desk import Desk
 from base_station.execution import Orders
 from base_station.phases import Concluding, Experimenting, PlanningAlpha, Settling
 from base_station.planning.requests import OpenLoopPlan
+from base_station.receiving.telemetry import Frame
 from base_station.steps.travelling import request_beta
-from base_station.telemetry import Frame
 
 EXPERIMENT_MIN_S = 1.0
 MOMENTS_PER_TICK = 4  # of the memory, each about 2 ms: a step must not take 10 ms

@@ -7,8 +7,8 @@ from base_station.commands import Command
 from base_station.desk import Desk
 from base_station.execution import Orders
 from base_station.phases import Arming, Connecting, Probing
+from base_station.receiving.telemetry import Frame
 from base_station.steps.travelling import request_beta
-from base_station.telemetry import Frame
 
 
 def get_ready(desk: Desk, commander: Commander) -> list[Command]:

@@ -8,7 +8,7 @@ from base_station import execution, mission, twin
 from base_station.desk import Desk
 from base_station.execution import Orders
 from base_station.phases import Finished, OnMission, PlanningBeta, Returning
-from base_station.telemetry import Frame
+from base_station.receiving.telemetry import Frame
 
 MAX_MISSION_PLANS = 4
 RETURN_TIMEOUT_S = 40.0

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from base_station.autopilots import NAMES, adapter
-from base_station.telemetry import Status
+from base_station.receiving.telemetry import Status
 from hil.airframe import OMNI_PLUS, QUAD_X
 from hil.errors import InputError
 from hil.mavlink import (

@@ -4,9 +4,9 @@ import pytest
 
 from base_station.autopilots import adapter
 from base_station.commands import AskRate, RequestMessage, SetParameter
-from base_station.fleet import Fleet
-from base_station.local_origin import PAIRS, LocalOrigin
-from base_station.preparing import SETTLED_S, Preparation
+from base_station.receiving.fleet import Fleet
+from base_station.receiving.local_origin import PAIRS, LocalOrigin
+from base_station.receiving.preparing import SETTLED_S, Preparation
 from hil.frames import Origin, ned_to_wgs84
 from hil.mavlink import (
     COMPONENT_AUTOPILOT,

@@ -11,7 +11,7 @@ from base_station.autopilots import adapter
 from base_station.commander import TAKEOVER_S, Commander
 from base_station.commands import Command, encode
 from base_station.execution import Orders, hold
-from base_station.telemetry import Track
+from base_station.receiving.telemetry import Track
 from hil.airframe import OMNI_PLUS
 from hil.mavlink import COMPONENT_GCS, CommandLong, Decoder, Encoder, LocalSetpoint
 from hil.mavlink import Command as MavCommand

@@ -5,11 +5,11 @@ import math
 import pytest
 
 from base_station.autopilots import adapter
-from base_station.budget import loads, refuse_overload
 from base_station.commands import Arm, Command, Drive, SetMode, encode
-from base_station.consent import ask_before_arming
-from base_station.safety import disarm_all, permitted, stop_all
-from base_station.telemetry import Sample, Track
+from base_station.field.budget import loads, refuse_overload
+from base_station.field.consent import ask_before_arming
+from base_station.field.safety import disarm_all, permitted, stop_all
+from base_station.receiving.telemetry import Sample, Track
 from hil.errors import InputError
 from hil.mavlink import COMPONENT_GCS, CommandLong, Decoder, Encoder, RoverMode
 from hil.scenario import Safety, StationView

@@ -5,7 +5,7 @@ from dataclasses import replace
 from base_station.commander import SURE_BEATS, TAKEOVER_S, Commander
 from base_station.commands import Arm, Drive, SetMode
 from base_station.execution import hold
-from base_station.telemetry import Track
+from base_station.receiving.telemetry import Track
 from hil.mavlink import RoverMode
 from hil.scenario import StationView
 

@@ -13,7 +13,7 @@ from base_station.belief.hypotheses import Hypothesis, candidates, nominal
 from base_station.belief.particles import report_faults
 from base_station.belief.watch import Baseline, Watch
 from base_station.execution import Orders, hold, plan_orders, probe_pulses, pulse_at, pulse_orders
-from base_station.telemetry import Frame
+from base_station.receiving.telemetry import Frame
 from hil.scenario import StationView
 
 PERIOD_S = 0.1

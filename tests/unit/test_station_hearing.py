@@ -8,7 +8,7 @@ import pytest
 from base_station.belief import hearing
 from base_station.belief.hearing import Hearing
 from base_station.execution import Orders
-from base_station.telemetry import Frame, Sample, Track
+from base_station.receiving.telemetry import Frame, Sample, Track
 
 DRAWS, VEHICLES, PERIOD_S = 400, 2, 0.1
 

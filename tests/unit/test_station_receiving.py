@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from base_station.fleet import LINK_LOST_WALL_S, Fleet
-from base_station.fleet_clock import FleetClock
+from base_station.receiving.fleet import LINK_LOST_WALL_S, Fleet
+from base_station.receiving.fleet_clock import FleetClock
+from base_station.receiving.telemetry import Sample, Track
 from base_station.station import Station
-from base_station.telemetry import Sample, Track
 from hil.mavlink import COMPONENT_AUTOPILOT, Heartbeat, LocalPosition, Received
 from hil.scenario import StationView
 

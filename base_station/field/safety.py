@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from base_station.autopilots import Autopilot
 from base_station.commands import Arm, Command, Drive, SetMode
-from base_station.telemetry import Track
+from base_station.receiving.telemetry import Track
 from hil.scenario import Point, Safety, StationView
 
 LOOK_AHEAD_S = 1.0  # what a rover at speed needs to stand

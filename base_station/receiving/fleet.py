@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 from base_station.autopilots import adapter
-from base_station.fleet_clock import FleetClock
-from base_station.local_origin import LocalOrigin
-from base_station.telemetry import Frame, Sample, Track, frame_at, note
+from base_station.receiving.fleet_clock import FleetClock
+from base_station.receiving.local_origin import LocalOrigin
+from base_station.receiving.telemetry import Frame, Sample, Track, frame_at, note
 from hil import mavlink
 from hil.scenario import StationView
 
