@@ -38,11 +38,7 @@ class Particles:
     @property
     def sizes(self) -> Array:
         """[R] of faults whose size is drawn; NaN for the others."""
-        ranges = [
-            SIZES.get(h.kind, (np.nan, np.nan)) if h.kind else (np.nan,) * 2 for h in self.twins
-        ]
-        low, high = np.array(ranges * DRAWS).T
-        return np.asarray(low + self.share * (high - low))
+        return _sizes(self.twins, self.share)
 
 
 def draw(baseline: Baseline, twins: Sequence[Hypothesis], rng: np.random.Generator) -> Particles:
@@ -89,10 +85,16 @@ def _spread_out(values: Array, twins: int, rng: np.random.Generator) -> Array:
 def _with_sizes(
     baseline: Baseline, twins: tuple[Hypothesis, ...], share: Array, parameters: twin.Parameters
 ) -> Particles:
-    bare = Particles(twins, share, parameters, None, None)  # type: ignore[arg-type]
-    sizes = bare.sizes
+    sizes = _sizes(twins, share)
     rows = [h if np.isnan(s) else h.sized(s) for h, s in zip(twins * DRAWS, sizes, strict=True)]
     return Particles(twins, share, parameters, baseline.faults(rows), report_faults(rows))
+
+
+def _sizes(twins: tuple[Hypothesis, ...], share: Array) -> Array:
+    unsized = (np.nan, np.nan)
+    ranges = [SIZES.get(h.kind, unsized) if h.kind else unsized for h in twins]
+    low, high = np.array(ranges * DRAWS).T
+    return np.asarray(low + share * (high - low))
 
 
 def report_faults(rows: Sequence[Hypothesis]) -> ReportFaults:
