@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from base_station import twin
+from base_station.belief.escalation import PUSH, remedy
 from base_station.belief.hypotheses import Hypothesis, nominal
 from base_station.belief.watch import Watch
 from base_station.execution import Orders
 from base_station.planning.policy import Commands, act, arrived, beta_observation, to_setpoints
 from base_station.planning.requests import PolicyWeights
-from hil.faults import Unit
 from hil.scenario import StationView
 
 Array = NDArray[np.float64]
@@ -91,7 +91,7 @@ def can_drive(watch: Watch, view: StationView) -> Flags:
     """[V] vehicles that can go anywhere by themselves."""
     able = np.ones(len(view.fleet), dtype=np.bool_)
     for hypothesis in watch.baseline.known:
-        if hypothesis.fault and hypothesis.fault.unit is Unit.MOTOR:
+        if remedy(hypothesis).startswith(PUSH):
             able[watch.baseline.model.index(hypothesis.sysid)] = view.yaw == "free"
     return able
 

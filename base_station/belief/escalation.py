@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 PLAUSIBLE = 0.005  # explanations less likely than this are not worth an experiment
 APART_M = 0.15  # reports that differ by this are told apart: five sigma
 PULSE_S, REST_S = 1.0, 1.0  # at full speed: what a weak motor does at walking pace is friction's
+PUSH = "push"
 WEAK = 0.5  # a motor with less than this of its force is no use
 
 
@@ -32,7 +33,7 @@ def remedy(hypothesis: Hypothesis) -> str:
         return hypothesis.name
     if fault.unit is Unit.MOTOR:
         weak = fault.type is not Type.PARTIAL or fault.size[0] < WEAK
-        return f"push {fault.instances}" if weak else "drive"
+        return f"{PUSH} {fault.instances}" if weak else "drive"
     if fault.type is Type.STUCK:
         return f"reckon {fault.axes}"
     return "reckon" if fault.type is Type.DRIFT else "filter"
