@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from base_station import execution
+from base_station.belief import doubt as doubts
 from base_station.desk import Desk
 from base_station.execution import Orders
 from base_station.phases import AnyPhase, Concluding, Experimenting, OnMission, Probing
@@ -71,6 +72,8 @@ def bridge(desk: Desk, gap: Gap, frame: Frame) -> None:
     else:
         desk.phase = _resumed(desk, gap, frame.time_s)
     desk.watch.restart(replace(frame, position_m=desk.mean_report_m()))
+    if desk.doubt is not None:
+        desk.doubt = doubts.anchor(desk.doubt, desk.mean_report_m())
     if isinstance(desk.phase, OnMission):
         desk.mission_plans -= 1  # the one that was cut short does not count
         plan_from_here(desk)

@@ -193,9 +193,9 @@ class Station:
             obeyed = self._gap.obeyed(frame, desk.orders, live)
             frame = replace(frame, driven=obeyed.driven)
         alarms = desk.watch.tick(frame, obeyed)
-        if desk.doubt is not None:
+        if desk.doubt is not None and self._gap is None:  # what was obeyed in a gap is a guess
             desk.doubt = doubts.tick(desk.doubt, frame, obeyed, desk.fleet.period_s)
-        elif self._gap is None:
+        elif desk.doubt is None and self._gap is None:
             self._take_alarms(alarms)
         self._note_contacts(frame)
         self._let_go_of_the_taken(frame)

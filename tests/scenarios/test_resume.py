@@ -26,7 +26,7 @@ MOMENTS = [  # the suspect alone decides in stuck_gps, and does not in rescue
     ("rescue", "plan_alpha", 31.0),
     ("rescue", "experiment", 33.5),
     ("stuck_gps", "probe", 7.0),
-    ("stuck_gps", "experiment", 25.0),
+    ("stuck_gps", "experiment", 22.2),  # while it drives blind, nobody knows how far it went
 ]
 
 
