@@ -55,7 +55,7 @@ def plausible(doubt: Doubt) -> list[int]:
 
 
 def for_contact(doubt: Doubt) -> list[int]:
-    """Of the plausible twins one for each way to move (the others no push can tell apart); two."""
+    """Of the plausible twins one for each remedy, as far as a push can tell; at least two."""
     p = doubt.posterior[: len(doubt.twins)]
     likely = plausible(doubt)
     chosen: dict[str, int] = {}
@@ -69,7 +69,7 @@ def _way_to_move(hypothesis: Hypothesis) -> str:
     fault = hypothesis.fault
     if fault is None or (fault.unit is Unit.GPS and fault.type is not Type.STUCK):
         return "as ordered"
-    return f"{fault.unit} {fault.type} {fault.instances} {fault.axes}"
+    return remedy(hypothesis)
 
 
 def solo(doubt: Doubt, view: StationView) -> OpenLoopPlan | None:
