@@ -1,4 +1,4 @@
-"""Motor power at start: what a booting firmware puts on its outputs must drive nobody off."""
+"""Motor power of a foreign firmware: what it puts on its outputs while disarmed drives nobody off."""
 
 from collections.abc import Mapping
 
@@ -10,23 +10,19 @@ Pulses = tuple[int, ...]
 
 
 class Powering:
-    """The motors of a foreign firmware stay without power until it has once sent no pulses at all.
+    """While one motor of a foreign firmware gets no pulses, none of its motors has power.
 
-    So a person would do it: motor power on when the autopilot is up and disarmed. (ArduPilot's
-    rover sends 1000 us on some outputs for seconds while it boots; MOT_SAFE_DISARM = 1 sends none
-    when disarmed.)
+    ArduPilot's simulated rover never puts less than 1000 us on outputs 1 and 3, not even with
+    MOT_SAFE_DISARM = 1, which means no pulses; outputs 2 and 4 tell whether it is disarmed.
     """
 
     def __init__(self, fleet: tuple[Vehicle, ...]) -> None:
-        self._waiting = {v.sysid: len(v.frame.motors) for v in fleet if v.autopilot != OURS}
+        self._motors = {v.sysid: len(v.frame.motors) for v in fleet if v.autopilot != OURS}
 
     def outputs(self, pwm_us: Mapping[int, Pulses]) -> dict[int, Pulses]:
-        """The same pulses, or none for a vehicle whose motors have no power yet."""
-        for sysid in list(self._waiting):
-            pulses = pwm_us.get(sysid, (1,))[: self._waiting[sysid]]
-            if all(pulse == PWM_OFF_US for pulse in pulses):
-                del self._waiting[sysid]
-        return {
-            sysid: (PWM_OFF_US,) * len(pulses) if sysid in self._waiting else pulses
-            for sysid, pulses in pwm_us.items()
-        }
+        """The same pulses, or none for a vehicle that is disarmed."""
+        return {sysid: self._powered(sysid, pulses) for sysid, pulses in pwm_us.items()}
+
+    def _powered(self, sysid: int, pulses: Pulses) -> Pulses:
+        disarmed = PWM_OFF_US in pulses[: self._motors.get(sysid, 0)]
+        return (PWM_OFF_US,) * len(pulses) if disarmed else pulses
