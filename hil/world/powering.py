@@ -1,4 +1,4 @@
-"""Motor power of a foreign firmware: what it puts on its outputs while disarmed drives nobody off."""
+"""Motor power of a foreign firmware: what it puts out while disarmed drives nobody off."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""A foreign firmware's motors have no power while one of them gets no pulses; ours are left alone."""
+"""A foreign firmware has no motor power while one motor gets no pulses; ours is left alone."""
 
 from hil.scenario import Scenario
 from hil.world.powering import Powering
