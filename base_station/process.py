@@ -167,7 +167,7 @@ def run(arguments: argparse.Namespace) -> None:
         except EmergencyStop:
             node.emergency_stop()
             raise
-        except StopRequested:
+        except BaseException:  # our own failure, too: nobody drives on unheeded
             node.hold_all()
             raise
 

@@ -1,13 +1,16 @@
 """SIGKILL at random moments: does a run end cleanly, or go on, and is every file readable?
 
-    python benchmarks/kills.py [--kills 20] [--victims station vehicle ...] [--scenario rescue]
-                               [--out runs/kills.jsonl] [--speed 1]
+    python benchmarks/kills.py [--kills 20] [--victims station planner+viewer ...] [--speed 1]
+                               [--scenario rescue] [--out runs/kills.jsonl] [--table]
 
-One run of `hil run --restart-station` over UDP for each kill, with `planning.planner=cem`, at a
-random moment of what a run takes. A station's kill has to end in the right verdict and a finished
-mission; any other in exit code 3 with the victim named. In either case no process may be left, and
-every file has to be readable, with at most a second lost. Results are lines of JSON: a benchmark
-that was stopped goes on. Then a table in Markdown; exit code 1 for anything else.
+One run of `hil run --restart-station` over UDP for each kill, with `planning.planner=cem`. A
+station dies at a random moment of one phase after the other, the others at random moments of what
+a run takes. The kill of a station, planner or viewer has to end in the right verdict and a finished
+mission; any other in exit code 3 with the victim named. In every case no process may be left, no
+vehicle may drive on while nobody steers it, every file has to be readable, and what was recorded
+has to reach to a second before the kill. Results are lines of JSON: a benchmark that was stopped
+goes on. `planner+viewer` kills both in one run, each at its own moment. Then a table in Markdown;
+exit code 1 for anything else.
 """
 
 import argparse
@@ -20,12 +23,17 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
+from functools import partial
+from itertools import chain
 from pathlib import Path
 
-from base_station.journal import Inputs, read_journal
+import pyarrow as pa
+from rerun.chunk import RrdReader
+
+from base_station.journal import Inputs, decoded, journal_files
 from base_station.tlog import read_tlog
-from hil.errors import HilError
 
 ROOT = Path(__file__).parents[1]
 PATTERNS = {
@@ -33,17 +41,49 @@ PATTERNS = {
     "vehicle": "--sysid 2",
     "planner": "base_station.planning.process",
     "world": "hil.cli world",
+    "viewer": "--serve-web",
 }
-MOMENTS_S = (2.0, 45.0)  # of fleet time, in which a run does all that it does
+VICTIMS = (*PATTERNS, "planner+viewer")
+DEFAULT = ("station", "vehicle", "world", "planner+viewer")
+NAMES = {
+    "planner+viewer": "planner",
+    "station": "base-station",
+    "vehicle": "sim-vehicle",
+    "planner": "planner",
+}
+SURVIVED = ("station", "planner", "viewer", "planner+viewer")  # whose death a run gets over
+PHASES_S = {  # how long they last, in fleet time (s)
+    "connect": 12.0,  # of wall time, from when the process starts
+    "probe": 11.0,
+    "plan_alpha": 3.0,
+    "experiment": 10.0,
+    "plan_beta": 6.0,
+    "mission": 15.0,
+}
+MOMENTS_S = (2.0, 60.0)  # of fleet time, in which a run does all that it does
 GIVE_UP_S = 900.0
 GONE_WITHIN_S = 10.0
 LOST_S = 1.0
+OBEYED_S = 4.0  # a set-point holds for 3 s; then a vehicle has to come to rest
+AT_REST_MPS = 0.05
+
+
+@dataclass(frozen=True)
+class Kill:
+    """When it happened: unix time, and world time (s)."""
+
+    epoch_s: float
+    world_s: float
 
 
 @dataclass(frozen=True)
 class Result:
+    """`lost_s` is from the newest record before the kill to the kill, in the worst of the files;
+    `drove_s` how long after a station's death any vehicle still moved."""
+
     victim: str
     number: int
+    planned: str
     moment_s: float
     phase: str
     code: int
@@ -52,67 +92,103 @@ class Result:
     named: bool
     orphans: int
     unreadable: tuple[str, ...]
+    lost_s: float
+    drove_s: float
     wall_s: float
     said: str = ""
 
     @property
+    def clean(self) -> bool:
+        kept = self.lost_s <= LOST_S and self.drove_s <= OBEYED_S
+        return kept and not self.orphans and not self.unreadable
+
+    @property
     def good(self) -> bool:
-        clean = not self.orphans and not self.unreadable
-        if self.victim == "station":
-            return clean and self.code == 0 and self.met
-        return clean and (self.code == 0 or (self.code == 3 and self.named))
+        if self.victim in SURVIVED:
+            return self.clean and self.code == 0 and self.met
+        return self.clean and self.code == 3 and self.named
 
 
 def one(victim: str, number: int, options: argparse.Namespace) -> Result:
-    moment_s = round(random.Random(f"{victim} {number}").uniform(*MOMENTS_S), 1)
     began_s = time.monotonic()
+    rng = random.Random(f"{victim} {number}")
+    phase = list(PHASES_S)[number % len(PHASES_S)] if victim == "station" else ""
+    plan = sorted(
+        (rng.uniform(0.0, PHASES_S[phase]) if phase else rng.uniform(*MOMENTS_S), name)
+        for name in victim.split("+")
+    )
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "run"
         command = [sys.executable, "-m", "hil.cli", "run", f"scenarios/{options.scenario}.yaml"]
         command += ["--out", str(out), "--seed", str(number), "--speed", options.speed]
         command += ["--restart-station", "--set", "planning.planner=cem"]
+        command += ["--serve"] * ("viewer" in victim)
         run = subprocess.Popen(
             command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
         )
         assert run.stderr is not None
-        struck = _strike_when(run, out, victim, moment_s)
+        kills = [
+            _strike_when(run, name, partial(_has_come, out, phase, moment_s), out)
+            for moment_s, name in plan
+        ]
         code = _end_of(run)
-        words = run.stderr.read()
+        words = run.stderr.read() + _text(out / "base-station.log")
         run.stderr.close()
         result = json.loads(_text(out / "result.json") or "{}")
         return Result(
             victim=victim,
             number=number,
-            moment_s=moment_s,
-            phase=_phase_at(out, moment_s),
+            planned=" ".join([*[f"{phase} +"] * bool(phase), *(f"{s:.1f} s" for s, _ in plan)]),
+            moment_s=round(kills[0].world_s, 1),
+            phase=" ".join(_phase_at(out, kill.world_s) for kill in kills),
             code=code,
             verdict=(result.get("verdict") or {}).get("hypothesis", ""),
             met=bool(result.get("expected_met")),
-            named=struck.split(" ")[0] in words or "planner" in words,
+            named=NAMES.get(victim, victim) in words,
             orphans=_orphans(str(out)),
             unreadable=tuple(_unreadable(out)),
+            lost_s=round(max(_lost_s(out, kill.epoch_s) for kill in kills), 2),
+            drove_s=round(_drove_s(out, kills[0].world_s), 2) if victim == "station" else 0.0,
             wall_s=round(time.monotonic() - began_s, 1),
             said=words.strip()[-300:],
         )
 
 
-def _strike_when(run: subprocess.Popen[str], out: Path, victim: str, moment_s: float) -> str:
-    """Kill the victim once world time has come that far; returns what is to be named."""
+def _strike_when(
+    run: subprocess.Popen[str], victim: str, has_come: Callable[[], bool], out: Path
+) -> Kill:
+    """Kill the victim once its moment has come; never, in a run that ends before."""
     while run.poll() is None:
         select.select([], [], [], 0.05)
-        if _world_s(out) < moment_s:
+        if not has_come():
             continue
         for pid, words in _descendants(run.pid).items():
             if PATTERNS[victim] in words:
                 os.kill(pid, signal.SIGKILL)
-                return {"vehicle": "sim-vehicle", "planner": "planner"}.get(victim, victim)
-        break
-    return victim
+                return Kill(time.time(), _world_s(out))
+    return Kill(time.time(), _world_s(out))
+
+
+def _has_come(out: Path, phase: str, moment_s: float) -> bool:
+    """World time has come that far, since the beginning, or since a phase began."""
+    if phase == "connect":
+        begun = [path.parent for path in out.parent.glob(".station-*/journal-0001.bin")]
+        started_s = [(folder / "base-station.log").stat().st_mtime for folder in begun]
+        return bool(started_s) and time.time() - started_s[0] >= moment_s
+    begun = [0.0] if not phase else [t for t, name in _phases(out) if name == phase]
+    return bool(begun) and _world_s(out) >= begun[0] + moment_s
 
 
 def _world_s(out: Path) -> float:
     lines = _text(out / "truth.jsonl").splitlines()[:-1]
     return float(json.loads(lines[-1]).get("time_s", 0.0)) if lines else 0.0
+
+
+def _phases(out: Path) -> list[tuple[float, str]]:
+    """(fleet time, name) as the run was told, the newest last."""
+    *events, _ = [*_text(out / "events.jsonl").split("\n")]
+    told = map(json.loads, events)
+    return [(e["time_s"], e["text"]) for e in told if e["kind"] == "phase"]
 
 
 def _end_of(run: subprocess.Popen[str]) -> int:
@@ -154,15 +230,12 @@ def _text(path: Path) -> str:
 
 
 def _phase_at(out: Path, moment_s: float) -> str:
-    events = [json.loads(line) for line in _text(out / "events.jsonl").splitlines()]
-    told = [e["text"] for e in events if e["kind"] == "phase" and e["time_s"] <= moment_s]
+    told = [name for time_s, name in _phases(out) if time_s <= moment_s]
     return told[-1] if told else "connect"
 
 
 def _unreadable(out: Path) -> list[str]:
-    """Files that cannot be read, and logs that end more than LOST_S before the others."""
     bad = []
-    ends_s: dict[str, float] = {}
     for path in sorted(out.iterdir()):
         try:
             if path.suffix == ".jsonl":
@@ -170,42 +243,89 @@ def _unreadable(out: Path) -> list[str]:
             elif path.suffix == ".json":
                 json.loads(path.read_text())
             elif path.suffix == ".tlog":
-                ends_s[path.name] = [t for t, _ in read_tlog(path)][-1] / 1e6
+                list(read_tlog(path))
             elif path.suffix == ".rrd":
-                subprocess.run(
-                    [sys.executable, "-m", "rerun_cli", "rrd", "stats", str(path)],
-                    check=True,
-                    capture_output=True,
-                )
-        except (ValueError, IndexError, HilError, subprocess.CalledProcessError):
-            bad.append(path.name)
-    steps = [r.epoch_us / 1e6 for r in read_journal(out) if isinstance(r, Inputs)]
-    bad += [name for name, end_s in ends_s.items() if steps and steps[-1] - end_s > 2 * LOST_S]
+                next(iter(RrdReader(str(path)).stream().to_chunks()))
+        except Exception as error:  # whatever it is: that file cannot be read
+            bad.append(f"{path.name}: {error}"[:100])
+    if not journal_files(out):
+        bad.append("no journal")
     return bad
 
 
+def _lost_s(out: Path, kill_s: float) -> float:
+    """From the newest record before the kill to the kill; the worst of journal, logs, recording."""
+    kept = chain.from_iterable(decoded(path.read_bytes()) for path in journal_files(out))
+    logs = [[r.epoch_us / 1e6 for r in kept if isinstance(r, Inputs)]]
+    logs += [[us / 1e6 for us, _ in read_tlog(path)] for path in out.glob("*.tlog")]
+    if (out / "mission.rrd").exists():
+        logs.append(list(_recorded_s(out / "mission.rrd")))
+    before = [[t for t in times if t <= kill_s] for times in logs]
+    return max((kill_s - max(times) for times in before if times), default=0.0)
+
+
+def _recorded_s(path: Path) -> Iterator[float]:
+    """Wall times of the rows in which the station told where the fleet is."""
+    for chunk in RrdReader(str(path)).stream().filter(content="/fleet").to_chunks():
+        if not chunk.is_static and "wall_time" in chunk.timeline_names:
+            times = chunk.to_record_batch().column("wall_time").cast(pa.int64()).to_pylist()
+            yield from (t / 1e9 for t in times)
+
+
+def _drove_s(out: Path, kill_s: float) -> float:
+    """How long after the kill somebody still moved, until all stood."""
+    for truth in map(json.loads, _text(out / "truth.jsonl").splitlines()):
+        if truth["type"] == "truth" and truth["time_s"] >= kill_s:
+            speeds_mps = [(v[3] ** 2 + v[4] ** 2) ** 0.5 for v in truth["vehicles"].values()]
+            if max(speeds_mps) <= AT_REST_MPS:
+                return float(truth["time_s"]) - kill_s
+    return float("inf")
+
+
 def table(results: list[Result]) -> str:
-    lines = [
-        "| killed | times | as it must be | right to the end | orphans | unreadable files |",
-        "|---|---|---|---|---|---|",
-    ]
-    for victim in PATTERNS:
+    head = (
+        "killed", "times", "as it must be", "right verdict, mission finished", "named", "orphans",
+        "unreadable files", "most lost (s)", "longest drive on (s)",
+    )  # fmt: skip
+    lines = [_row(*head), _row(*["---"] * len(head))]
+    for victim in VICTIMS:
         mine = [r for r in results if r.victim == victim]
+        phases = (
+            dict.fromkeys(r.planned.split(" +")[0] for r in mine) if victim == "station" else {}
+        )
         if mine:
-            lines.append(
-                f"| {victim} | {len(mine)} | {sum(r.good for r in mine)} "
-                f"| {sum(r.met for r in mine)} | {sum(r.orphans for r in mine)} "
-                f"| {sum(len(r.unreadable) for r in mine)} |"
-            )
+            lines.append(_summary(victim, mine))
+        for phase in phases:
+            there = [r for r in mine if r.planned.startswith(phase)]
+            lines.append(_summary(f"{victim}, in `{phase}`", there))
     return "\n".join(lines)
+
+
+def _summary(name: str, mine: list[Result]) -> str:
+    return _row(
+        name,
+        len(mine),
+        sum(r.good for r in mine),
+        sum(r.met for r in mine),
+        sum(r.named for r in mine),
+        sum(r.orphans for r in mine),
+        sum(len(r.unreadable) for r in mine),
+        f"{max(r.lost_s for r in mine):.2f}",
+        f"{max(r.drove_s for r in mine):.1f}",
+    )
+
+
+def _row(*cells: object) -> str:
+    return f"| {' | '.join(map(str, cells))} |"
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--kills", type=int, default=20, help="of each victim")
-    parser.add_argument("--victims", nargs="+", choices=PATTERNS, default=list(PATTERNS))
+    parser.add_argument("--victims", nargs="+", choices=VICTIMS, default=DEFAULT)
     parser.add_argument("--scenario", default="rescue")
     parser.add_argument("--speed", default="1")
+    parser.add_argument("--table", action="store_true", help="of what there is; nothing is run")
     parser.add_argument("--out", type=Path, default=ROOT / "runs" / "kills.jsonl")
     options = parser.parse_args()
     options.out.parent.mkdir(parents=True, exist_ok=True)
@@ -213,7 +333,7 @@ def main() -> int:
     results = [Result(**{**t, "unreadable": tuple(t["unreadable"])}) for t in trees]
     done = {(r.victim, r.number) for r in results}
     with options.out.open("a", encoding="utf-8") as file:
-        for victim in options.victims:
+        for victim in options.victims if not options.table else ():
             for number in range(options.kills):
                 if (victim, number) in done:
                     continue

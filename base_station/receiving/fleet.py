@@ -11,6 +11,7 @@ from hil.scenario import StationView
 
 WAIT_FOR_LATE_S = 0.3  # fleet time; then a tick goes on without the vehicle that is late
 LINK_LOST_WALL_S = 5.0
+ANSWER_WITHIN_S = 30.0  # a TIMESYNC answer to what was asked later than now, or long ago, is none
 LONG_GAP_S = 6.0  # after that long without a command nothing moves: no need to tick through it
 
 
@@ -50,8 +51,11 @@ class Fleet:
             v_north, v_east, _ = value.velocity_mps
             track.position(Sample(time_s, (north, east), (v_north, v_east)))
         elif isinstance(value, mavlink.Timesync) and value.tc1_ns:
-            self._clock.reply(member.sysid, value.tc1_ns, value.ts1_ns, int(wall_s * 1e9))
-            track.round_trip_s = self._clock.round_trip_s(member.sysid)
+            now_ns = int(wall_s * 1e9)
+            if 0 <= now_ns - value.ts1_ns <= ANSWER_WITHIN_S * 1e9:
+                self._clock.reply(member.sysid, value.tc1_ns, value.ts1_ns, now_ns)
+                # a vehicle whose clock goes backwards is no reason to look into the future
+                track.round_trip_s = max(0.0, self._clock.round_trip_s(member.sysid))
 
     def fleet_time_s(self, index: int, boot_s: float) -> float:
         """A vehicle's own time as fleet time."""

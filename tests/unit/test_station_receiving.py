@@ -7,7 +7,7 @@ from base_station.receiving.fleet import LINK_LOST_WALL_S, Fleet
 from base_station.receiving.fleet_clock import FleetClock
 from base_station.receiving.telemetry import Sample, Track
 from base_station.station import Station
-from hil.mavlink import COMPONENT_AUTOPILOT, Heartbeat, LocalPosition, Received
+from hil.mavlink import COMPONENT_AUTOPILOT, Heartbeat, LocalPosition, Received, Timesync
 from hil.scenario import StationView
 
 
@@ -76,6 +76,20 @@ def test_boot_clocks_that_differ_are_brought_together() -> None:
         clock.reply(2, 9_000_000_000 + delayed_ns, asked_ns, delayed_ns + 1_000_000)
     assert clock.fleet_time_s(1, 5.0) == pytest.approx(5.0)
     assert clock.fleet_time_s(2, 9.0) == pytest.approx(5.0, abs=1e-3)
+
+
+def test_answers_to_what_was_never_asked_tell_nothing_of_the_link(
+    rescue_view: StationView,
+) -> None:
+    fleet = Fleet(rescue_view)
+    for now_s, asked_s in ((50.0, 1e6), (51.0, -1e6), (52.0, 60.0)):
+        answer = Timesync(int(now_s * 1e9), int(asked_s * 1e9))
+        fleet.receive(0, Received(1, COMPONENT_AUTOPILOT, answer), now_s)
+    assert fleet.tracks[0].round_trip_s == 0.0
+    for boot_s, asked_s in ((9.0, 53.0), (1.0, 54.0)):  # a vehicle that lives backwards
+        answer = Timesync(int(boot_s * 1e9), int(asked_s * 1e9))
+        fleet.receive(0, Received(1, COMPONENT_AUTOPILOT, answer), asked_s + 0.1)
+    assert fleet.tracks[0].round_trip_s == 0.0
 
 
 def test_a_vehicle_that_falls_silent_is_named_and_the_fleet_holds(rescue_view: StationView) -> None:
