@@ -18,7 +18,16 @@ from base_station.records import Event
 from base_station.refusals import Refusals
 from base_station.station import Outputs, Station
 from hil.link import Link
-from hil.mavlink import COMPONENT_GCS, Decoder, Encoder, Received, Signing, ticks
+from hil.mavlink import (
+    COMPONENT_AUTOPILOT,
+    COMPONENT_GCS,
+    Decoder,
+    Encoder,
+    Heartbeat,
+    Received,
+    Signing,
+    ticks,
+)
 from hil.scenario import StationView
 
 REPEATS = 3  # of what is said only once
@@ -130,8 +139,12 @@ class StationNode:
             self._log(index, datagram)
 
     def is_welcome(self, index: int, datagram: bytes) -> bool:
-        """Whether what comes from a new address may come from that vehicle."""
-        return any(m.sysid == self._sysids[index] for m in self._decoders[index].peek(datagram))
+        """Whether what comes from a new address is that vehicle's heartbeat, signed if need be."""
+        return any(
+            (m.sysid, m.compid) == (self._sysids[index], COMPONENT_AUTOPILOT)
+            and isinstance(m.value, Heartbeat)
+            for m in self._decoders[index].peek(datagram)
+        )
 
     def hear_of(self, index: int, sysid: int) -> None:
         """Somebody who is not of the fleet speaks where a vehicle should."""

@@ -9,8 +9,9 @@ a run takes. The kill of a station, planner or viewer has to end in the right ve
 mission; any other in exit code 3 with the victim named. In every case no process may be left, no
 vehicle may drive on while nobody steers it, every file has to be readable, and what was recorded
 has to reach to a second before the kill. Results are lines of JSON: a benchmark that was stopped
-goes on. `planner+viewer` kills both in one run, each at its own moment. Then a table in Markdown;
-exit code 1 for anything else.
+goes on. `planner+viewer` kills both in one run, each at its own moment. Two more get a run over
+what happens to their station: `stopped` stops it for 5 s, `starved` gives it a tenth of 30 s.
+Then a table in Markdown; exit code 1 for anything else.
 """
 
 import argparse
@@ -18,12 +19,14 @@ import json
 import os
 import random
 import select
+import shutil
 import signal
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import chain
@@ -43,6 +46,8 @@ PATTERNS = {
     "world": "hil.cli world",
     "viewer": "--serve-web",
 }
+SLEEPY = {"stopped": (5.0, 0.0, 1), "starved": (0.09, 0.01, 300)}  # s stopped, s awake, times
+PATTERNS |= dict.fromkeys(SLEEPY, PATTERNS["station"])
 VICTIMS = (*PATTERNS, "planner+viewer")
 DEFAULT = ("station", "vehicle", "world", "planner+viewer")
 NAMES = {
@@ -51,7 +56,13 @@ NAMES = {
     "vehicle": "sim-vehicle",
     "planner": "planner",
 }
-SURVIVED = ("station", "planner", "viewer", "planner+viewer")  # whose death a run gets over
+SURVIVED = (
+    "station",
+    "planner",
+    "viewer",
+    "planner+viewer",
+    *SLEEPY,
+)  # whose death a run gets over
 PHASES_S = {  # how long they last, in fleet time (s)
     "connect": 12.0,  # of wall time, from when the process starts
     "probe": 11.0,
@@ -112,7 +123,11 @@ class Result:
 def one(victim: str, number: int, options: argparse.Namespace) -> Result:
     began_s = time.monotonic()
     rng = random.Random(f"{victim} {number}")
-    phase = list(PHASES_S)[number % len(PHASES_S)] if victim == "station" else ""
+    phase = (
+        list(PHASES_S)[number % len(PHASES_S)]
+        if PATTERNS.get(victim) == PATTERNS["station"]
+        else ""
+    )
     plan = sorted(
         (rng.uniform(0.0, PHASES_S[phase]) if phase else rng.uniform(*MOMENTS_S), name)
         for name in victim.split("+")
@@ -132,10 +147,10 @@ def one(victim: str, number: int, options: argparse.Namespace) -> Result:
             for moment_s, name in plan
         ]
         code = _end_of(run)
-        words = run.stderr.read() + _text(out / "base-station.log")
+        words = run.stderr.read() + text(out / "base-station.log")
         run.stderr.close()
-        result = json.loads(_text(out / "result.json") or "{}")
-        return Result(
+        result = json.loads(text(out / "result.json") or "{}")
+        found = Result(
             victim=victim,
             number=number,
             planned=" ".join([*[f"{phase} +"] * bool(phase), *(f"{s:.1f} s" for s, _ in plan)]),
@@ -145,13 +160,16 @@ def one(victim: str, number: int, options: argparse.Namespace) -> Result:
             verdict=(result.get("verdict") or {}).get("hypothesis", ""),
             met=bool(result.get("expected_met")),
             named=NAMES.get(victim, victim) in words,
-            orphans=_orphans(str(out)),
+            orphans=orphans(str(out)),
             unreadable=tuple(_unreadable(out)),
             lost_s=round(max(_lost_s(out, kill.epoch_s) for kill in kills), 2),
             drove_s=round(_drove_s(out, kills[0].world_s), 2) if victim == "station" else 0.0,
             wall_s=round(time.monotonic() - began_s, 1),
             said=words.strip()[-300:],
         )
+        if options.keep is not None and not found.good:
+            shutil.copytree(out, options.keep / f"{victim}-{number}", dirs_exist_ok=True)
+        return found
 
 
 def _strike_when(
@@ -162,11 +180,24 @@ def _strike_when(
         select.select([], [], [], 0.05)
         if not has_come():
             continue
-        for pid, words in _descendants(run.pid).items():
+        for pid, words in descendants(run.pid).items():
             if PATTERNS[victim] in words:
-                os.kill(pid, signal.SIGKILL)
-                return Kill(time.time(), _world_s(out))
-    return Kill(time.time(), _world_s(out))
+                kill = Kill(time.time(), world_s(out))
+                if victim in SLEEPY:
+                    _put_to_sleep(pid, *SLEEPY[victim])
+                else:
+                    os.kill(pid, signal.SIGKILL)
+                return kill
+    return Kill(time.time(), world_s(out))
+
+
+def _put_to_sleep(pid: int, stopped_s: float, awake_s: float, times: int) -> None:
+    with suppress(ProcessLookupError):
+        for _ in range(times):
+            os.kill(pid, signal.SIGSTOP)
+            time.sleep(stopped_s)
+            os.kill(pid, signal.SIGCONT)
+            time.sleep(awake_s)
 
 
 def _has_come(out: Path, phase: str, moment_s: float) -> bool:
@@ -175,18 +206,18 @@ def _has_come(out: Path, phase: str, moment_s: float) -> bool:
         begun = [path.parent for path in out.parent.glob(".station-*/journal-0001.bin")]
         started_s = [(folder / "base-station.log").stat().st_mtime for folder in begun]
         return bool(started_s) and time.time() - started_s[0] >= moment_s
-    begun = [0.0] if not phase else [t for t, name in _phases(out) if name == phase]
-    return bool(begun) and _world_s(out) >= begun[0] + moment_s
+    begun = [0.0] if not phase else [t for t, name in phases(out) if name == phase]
+    return bool(begun) and world_s(out) >= begun[0] + moment_s
 
 
-def _world_s(out: Path) -> float:
-    lines = _text(out / "truth.jsonl").splitlines()[:-1]
+def world_s(out: Path) -> float:
+    lines = text(out / "truth.jsonl").splitlines()[:-1]
     return float(json.loads(lines[-1]).get("time_s", 0.0)) if lines else 0.0
 
 
-def _phases(out: Path) -> list[tuple[float, str]]:
+def phases(out: Path) -> list[tuple[float, str]]:
     """(fleet time, name) as the run was told, the newest last."""
-    *events, _ = [*_text(out / "events.jsonl").split("\n")]
+    *events, _ = [*text(out / "events.jsonl").split("\n")]
     told = map(json.loads, events)
     return [(e["time_s"], e["text"]) for e in told if e["kind"] == "phase"]
 
@@ -199,30 +230,30 @@ def _end_of(run: subprocess.Popen[str]) -> int:
         return run.wait()
 
 
-def _descendants(pid: int) -> dict[int, str]:
+def descendants(pid: int) -> dict[int, str]:
     found: dict[int, str] = {}
     for thread in Path(f"/proc/{pid}/task").glob("*"):
-        for below in map(int, _text(thread / "children").split()):
-            found[below] = _text(Path(f"/proc/{below}/cmdline")).replace("\0", " ")
-            found |= _descendants(below)
+        for below in map(int, text(thread / "children").split()):
+            found[below] = text(Path(f"/proc/{below}/cmdline")).replace("\0", " ")
+            found |= descendants(below)
     return found
 
 
-def _orphans(out: str) -> int:
+def orphans(out: str) -> int:
     """Processes that still know this run's folder, once the kernel has had time to bury them."""
     end_s = time.monotonic() + GONE_WITHIN_S
     while True:
         left = [
             p
             for p in Path("/proc").glob("[0-9]*")
-            if out in _text(p / "cmdline") and int(p.name) != os.getpid()
+            if out in text(p / "cmdline") and int(p.name) != os.getpid()
         ]
         if not left or time.monotonic() > end_s:
             return len(left)
         select.select([], [], [], 0.2)
 
 
-def _text(path: Path) -> str:
+def text(path: Path) -> str:
     try:
         return path.read_text(errors="replace")
     except OSError:
@@ -230,7 +261,7 @@ def _text(path: Path) -> str:
 
 
 def _phase_at(out: Path, moment_s: float) -> str:
-    told = [name for time_s, name in _phases(out) if time_s <= moment_s]
+    told = [name for time_s, name in phases(out) if time_s <= moment_s]
     return told[-1] if told else "connect"
 
 
@@ -274,7 +305,7 @@ def _recorded_s(path: Path) -> Iterator[float]:
 
 def _drove_s(out: Path, kill_s: float) -> float:
     """How long after the kill somebody still moved, until all stood."""
-    for truth in map(json.loads, _text(out / "truth.jsonl").splitlines()):
+    for truth in map(json.loads, text(out / "truth.jsonl").splitlines()):
         if truth["type"] == "truth" and truth["time_s"] >= kill_s:
             speeds_mps = [(v[3] ** 2 + v[4] ** 2) ** 0.5 for v in truth["vehicles"].values()]
             if max(speeds_mps) <= AT_REST_MPS:
@@ -322,19 +353,21 @@ def _row(*cells: object) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--kills", type=int, default=20, help="of each victim")
+    parser.add_argument("--first", type=int, default=0, help="number of the first of them")
     parser.add_argument("--victims", nargs="+", choices=VICTIMS, default=DEFAULT)
     parser.add_argument("--scenario", default="rescue")
     parser.add_argument("--speed", default="1")
+    parser.add_argument("--keep", type=Path, metavar="DIR", help="the folders of bad runs")
     parser.add_argument("--table", action="store_true", help="of what there is; nothing is run")
     parser.add_argument("--out", type=Path, default=ROOT / "runs" / "kills.jsonl")
     options = parser.parse_args()
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    trees = [json.loads(line) for line in _text(options.out).splitlines()]
+    trees = [json.loads(line) for line in text(options.out).splitlines()]
     results = [Result(**{**t, "unreadable": tuple(t["unreadable"])}) for t in trees]
     done = {(r.victim, r.number) for r in results}
     with options.out.open("a", encoding="utf-8") as file:
         for victim in options.victims if not options.table else ():
-            for number in range(options.kills):
+            for number in range(options.first, options.first + options.kills):
                 if (victim, number) in done:
                     continue
                 result = one(victim, number, options)

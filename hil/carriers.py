@@ -19,7 +19,7 @@ Heard = tuple[Address | None, Frame]  # who it came from, where that can differ
 
 
 class Carrier(Protocol):
-    """Non-blocking. `peer` None means the only one there is, or the last that spoke."""
+    """Non-blocking. `peer` None means the one that was given; nobody, where none was."""
 
     def fileno(self) -> int: ...
 
@@ -31,11 +31,12 @@ class Carrier(Protocol):
 
 
 class UdpCarrier:
-    """A UDP socket; the peers of a bound one are whoever has spoken."""
+    """A UDP socket. `given` is whom it speaks to first; a bound one has nobody to speak to before
+    it is told whom: that somebody has sent a datagram does not make a vehicle of him."""
 
-    def __init__(self, sock: socket.socket, peer: Address | None) -> None:
+    def __init__(self, sock: socket.socket, given: Address | None) -> None:
         sock.setblocking(False)
-        self._socket, self._peer = sock, peer
+        self._socket, self._given = sock, given
 
     def fileno(self) -> int:
         return self._socket.fileno()
@@ -49,11 +50,10 @@ class UdpCarrier:
                 return heard
             except ConnectionRefusedError:
                 continue
-            self._peer = sender
             heard += [(sender, frame) for frame in frames_of(data)]
 
     def send(self, datagram: bytes, peer: Address | None) -> None:
-        to = peer or self._peer
+        to = peer or self._given
         if to is not None:
             with suppress(BlockingIOError, ConnectionRefusedError):  # UDP: lost, as on the air
                 self._socket.sendto(datagram, to)

@@ -19,7 +19,8 @@ def to_file(path: Path, run_id: str, blueprint: Any = None) -> Any:
     """A stream into a file. A SIGKILL costs what came less than 1 s before."""
     path.touch()  # before a stream exists that would be left without a sink
     stream = _stream(run_id, FILE_PERIOD_S)
-    stream.set_sinks(rr.FileSink(str(path)), default_blueprint=blueprint)
+    # a footer lists all chunks, and memory keeps the list: 1 MB a minute; `merge` adds one later
+    stream.set_sinks(rr.FileSink(str(path), write_footer=False), default_blueprint=blueprint)
     return stream
 
 

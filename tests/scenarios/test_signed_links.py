@@ -76,3 +76,13 @@ def test_who_is_welcome_where_a_vehicle_is_expected(rescue: Scenario) -> None:
     assert not node.is_welcome(1, beat(2, OTHER))
     assert not node.is_welcome(1, beat(2, None))
     assert not node.is_welcome(1, beat(2, KEY, late=61 * 100_000))
+
+
+def test_without_a_key_only_a_heartbeat_of_the_vehicle_makes_its_sender_the_vehicle(
+    rescue: Scenario,
+) -> None:
+    rig, _, _ = start(rescue, scripted(0.8))
+    assert rig.node.is_welcome(1, Encoder(2, 1).gcs_heartbeat())
+    assert not rig.node.is_welcome(1, Encoder(3, 1).gcs_heartbeat())
+    assert not rig.node.is_welcome(1, Encoder(2, 190).gcs_heartbeat())
+    assert not rig.node.is_welcome(1, Encoder(2, 1).timesync(1, 2))

@@ -15,7 +15,7 @@ from hil.carriers import UdpCarrier, open_carrier
 from hil.connection import Connection, parse_connection
 from hil.errors import InputError
 from hil.link import PEER_FORGOTTEN_S
-from hil.mavlink import COMPONENT_AUTOPILOT, COMPONENT_GCS, Attitude, Encoder
+from hil.mavlink import COMPONENT_AUTOPILOT, COMPONENT_GCS, Attitude, Encoder, Heartbeat
 from hil.mavlink.stream import FrameCutter, message_id
 from hil.router import Router
 
@@ -110,6 +110,36 @@ def test_nobody_takes_the_place_of_a_vehicle_that_speaks(stack: ExitStack) -> No
     assert until_heard(router, 1) == [attitude(1, 5.0)]
     end.send(order)
     assert thief.recv(1000) == order
+
+
+def test_a_stranger_who_sends_first_is_told_nothing(stack: ExitStack) -> None:
+    router, port = bound(stack)
+    end = router.end(1)
+    end.guard(lambda frame: message_id(frame) == Heartbeat.ID, lambda _sysid: None)
+    stranger, vehicle = udp(stack), udp(stack)
+    beat = Encoder(1, COMPONENT_AUTOPILOT).gcs_heartbeat()
+    stranger.sendto(attitude(77) + attitude(1), (HOST, port))
+    vehicle.sendto(attitude(1) + beat, (HOST, port))
+    assert heard(router, 1) == [beat]
+    end.send(Encoder(250, COMPONENT_GCS).gcs_heartbeat())
+    end.send(Encoder(250, COMPONENT_GCS).arm(1))
+    assert len([vehicle.recv(1000) for _ in range(2)]) == 2
+    stranger.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        stranger.recv(1000)
+
+
+def test_before_a_vehicle_is_known_nobody_is_spoken_to(stack: ExitStack) -> None:
+    router, port = bound(stack)
+    end = router.end(1)
+    stranger = udp(stack)
+    stranger.sendto(attitude(77), (HOST, port))
+    assert heard(router, 1) == []
+    end.send(Encoder(250, COMPONENT_GCS).arm(1))
+    end.send(Encoder(250, COMPONENT_GCS).gcs_heartbeat())
+    stranger.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        stranger.recv(1000)
 
 
 def until_heard(router: Router, sysid: int) -> list[bytes]:
