@@ -9,6 +9,7 @@ from typing import Any
 
 from base_station.journal import event_tree
 from base_station.listening import Listener
+from base_station.parts import Room, next_part, parts_of
 from base_station.planning.requests import PlanProgress, PlanReady
 from base_station.recorder import Recorder
 from base_station.records import Event, Snapshot
@@ -37,11 +38,23 @@ class TelemetryLogs(Silent):
 
     name = "the telemetry log"
 
-    def __init__(self, folder: Path, view: StationView, append: bool = False) -> None:
-        self._logs = [TlogWriter(folder / f"{m.name}.tlog", append) for m in view.fleet]
+    def __init__(
+        self, folder: Path, view: StationView, append: bool = False, room: Room | None = None
+    ) -> None:
+        self._firsts = [folder / f"{m.name}.tlog" for m in view.fleet]
+        self._room = room or Room()
+        self._logs = [TlogWriter(_begun(first, append), append) for first in self._firsts]
 
     def datagram(self, index: int, time_us: int, datagram: bytes) -> None:
         self._logs[index].write(time_us, datagram)
+        if self._logs[index].size >= self._room.part_bytes:
+            self._begin_part(index)
+
+    def _begin_part(self, index: int) -> None:
+        first = self._firsts[index]
+        self._logs[index].close()
+        self._room.make(first.parent)
+        self._logs[index] = TlogWriter(next_part(first))
 
     def close(self) -> None:
         """All of them, even where one cannot write its rest. Raises OSError."""
@@ -97,6 +110,16 @@ class EventLog(Silent):
         self._file.close()
 
 
+def _begun(first: Path, append: bool) -> Path:
+    """The part to go on with; a log that begins anew leaves no parts of one before."""
+    if append:
+        return [first, *parts_of(first)][-1]
+    for old in parts_of(first):
+        if old != first:
+            old.unlink()
+    return first
+
+
 def _close(listener: TelemetryLogs | EventLog | Recorder) -> None:
     with suppress(OSError):  # a full disk has been heard of already
         listener.close()
@@ -110,16 +133,20 @@ def open_listeners(
     viewer: str | None,
     say: Callable[[dict[str, Any]], None],
     resumed: int = 0,
+    room: Room | None = None,
 ) -> list[Listener]:
     """Everything that listens to a station: telemetry logs, events, recording, lines.
 
     They write into `folder` and are closed by `stack`. One that was `resumed` goes on with the
-    files of the one before, but for the recording, which gets a part of its own.
+    files of the one before, but for the recording, which gets a part of its own. `room` bounds
+    logs and recording.
     """
-    logs = TelemetryLogs(folder, view, append=resumed > 0)
+    room = room or Room()
+    logs = TelemetryLogs(folder, view, append=resumed > 0, room=room)
     events = EventLog(folder / "events.jsonl", append=resumed > 0)
-    part = f"station-{resumed + 1}.rrd" if resumed else "station.rrd"
-    recorder = Recorder(folder / part, run_id, view, viewer=viewer)
+    first = folder / "station.rrd"
+    recording = next_part(first) if resumed else _begun(first, append=False)
+    recorder = Recorder(recording, run_id, view, viewer=viewer, room=room)
     for listener in (logs, events, recorder):
         stack.callback(_close, listener)
     return [logs, events, recorder, Lines(say)]

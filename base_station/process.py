@@ -27,6 +27,7 @@ from base_station.field.keys import Typed, emergency_key
 from base_station.journal import Head, Journal, journal_files
 from base_station.listeners import open_listeners
 from base_station.node import StationNode
+from base_station.parts import Room
 from base_station.planner_child import PlannerChild
 from base_station.receiving.telemetry import Frame
 from base_station.recording.streams import VIEWER
@@ -34,7 +35,7 @@ from base_station.resuming import Resumed, resume
 from base_station.wiring import open_links
 from hil.errors import HilError, InputError
 from hil.mavlink import read_key
-from hil.options import Parser
+from hil.options import Parser, megabytes
 from hil.scenario import StationView, load_station_view
 
 VIEW_FILE = "view.json"
@@ -95,6 +96,12 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
         metavar="HOST:PORT",
         help=f"stream to the Rerun viewer there, if one runs; without an address {VIEWER}",
     )
+    parser.add_argument(
+        "--keep-mb",
+        type=megabytes,
+        metavar="MB",
+        help="of telemetry logs and recording, keep the newest (default: all)",
+    )
     parser.add_argument("--run-id", default=None, help="recording id, to share one recording")
     arguments = parser.parse_args(argv)
     if (arguments.view is None) == (arguments.resume is None):
@@ -138,7 +145,8 @@ def run(arguments: argparse.Namespace) -> None:
         view_file = arguments.view or _written_view(out, view)
         planner = PlannerChild(view_file, out / "planner.log")
         stack.callback(planner.close)
-        listeners = open_listeners(stack, out, run_id, view, arguments.viewer, say, parts)
+        room = Room.of_megabytes(arguments.keep_mb)
+        listeners = open_listeners(stack, out, run_id, view, arguments.viewer, say, parts, room)
         _compile_twin(view)
         gc.collect()
         gc.freeze()  # what is there by now stays: looking through it again takes 0.2 s

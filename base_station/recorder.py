@@ -9,11 +9,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from base_station.parts import Room
 from base_station.planning.requests import PlanProgress, PlanReady, Training
 from base_station.recording import streams
 from base_station.recording.blueprint import blueprint
+from base_station.recording.files import FileWriter
 from base_station.recording.outlets import UNLIMITED, Channel, Queued
-from base_station.recording.writer import Writer
+from base_station.recording.writer import Teller, Writer
 from base_station.records import Event, Snapshot
 from hil.scenario import StationView
 
@@ -22,13 +24,19 @@ class Recorder:
     """Writes `path` and, where asked and one answers, feeds a viewer.
 
     `viewer` is its address as host:port. Recordings of one `run_id` are one recording, whoever
-    writes them.
+    writes them. A file that is full, as `room` has it, is followed by another.
     """
 
     def __init__(
-        self, path: Path, run_id: str, view: StationView, viewer: str | None = None
+        self,
+        path: Path,
+        run_id: str,
+        view: StationView,
+        viewer: str | None = None,
+        room: Room | None = None,
     ) -> None:
-        self._channels = [Channel(Queued(UNLIMITED), partial(_file_writer, path, run_id, view))]
+        in_files = partial(FileWriter, path, run_id, view, room or Room())
+        self._channels: list[Channel[Teller]] = [Channel(Queued(UNLIMITED), in_files)]
         if viewer:
             self._channels.append(Channel(Queued(), partial(_viewer_writer, viewer, run_id, view)))
 
@@ -63,14 +71,9 @@ class Recorder:
         for channel in self._channels:
             channel.close()
 
-    def _tell(self, call: Callable[[Writer], None]) -> None:
+    def _tell(self, call: Callable[[Teller], None]) -> None:
         for channel in self._channels:
             channel.tell(call)
-
-
-def _file_writer(path: Path, run_id: str, view: StationView) -> Writer:
-    stream = streams.to_file(path, run_id, blueprint(view))
-    return Writer(stream, run_id, view, streams.FILE_PERIOD_S)
 
 
 def _viewer_writer(address: str, run_id: str, view: StationView) -> Writer | None:

@@ -38,6 +38,11 @@ class TlogWriter:
             self._file.flush()
             self._flushed_us = time_us
 
+    @property
+    def size(self) -> int:
+        """Bytes, those not flushed yet included."""
+        return self._file.tell()
+
     def close(self) -> None:
         self._file.close()
 

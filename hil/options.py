@@ -54,3 +54,14 @@ def minutes(text: str) -> float:
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text}: must be more than 0")
     return value
+
+
+LEAST_MB = 16.0
+
+
+def megabytes(text: str) -> float:
+    """Room on a disk; less than the least is no log worth having."""
+    value = float(text)
+    if not LEAST_MB <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text}: must be {LEAST_MB:g} or more")
+    return value

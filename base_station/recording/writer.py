@@ -1,6 +1,6 @@
 """Station messages to rows of a recording."""
 
-from typing import Any
+from typing import Any, Protocol
 
 import rerun as rr
 
@@ -18,16 +18,42 @@ from hil.scenario import StationView
 LEVELS: dict[EventKind, str] = {"anomaly": "WARN", "takeover": "WARN", "command": "WARN"}
 
 
-class Writer:
-    """Writes one stream, from one thread. Errors of the recording library come through."""
+class Teller(Protocol):
+    """Takes what the station tells."""
 
-    def __init__(self, stream: Any, run_id: str, view: StationView, period_s: float) -> None:
+    def snapshot(self, snapshot: Snapshot) -> None: ...
+
+    def event(self, event: Event) -> None: ...
+
+    def progress(self, progress: PlanProgress) -> None: ...
+
+    def training(self, training: Training) -> None: ...
+
+    def plan(self, ready: PlanReady) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class Writer:
+    """Writes one stream, from one thread. Errors of the recording library come through.
+
+    `brief` is that of the stream before, where this one goes on.
+    """
+
+    def __init__(
+        self,
+        stream: Any,
+        run_id: str,
+        view: StationView,
+        period_s: float,
+        brief: Brief | None = None,
+    ) -> None:
         self._stream = stream
         self._batch = Batch(stream, period_s)
         self._fleet = FleetRows(self._batch, view)
         self._twins = TwinRows(self._batch, stream, view)
         self._learning = LearningRows(stream, len(view.fleet))
-        self._brief = Brief(run_id, view)
+        self.brief = brief or Brief(run_id, view)
         self._states: dict[str, str] = {}
         self._now_s = 0.0
         log_scene(stream, view)
@@ -52,7 +78,7 @@ class Writer:
         set_time(self._stream, event.time_s)
         line = rr.TextLog(f"{event.kind}: {event.text}", level=LEVELS.get(event.kind, "INFO"))
         self._stream.log(f"/events/{event.kind}", line)
-        if self._brief.hear(event):
+        if self.brief.hear(event):
             self._write_brief(event.time_s)
 
     def progress(self, progress: PlanProgress) -> None:
@@ -82,5 +108,5 @@ class Writer:
 
     def _write_brief(self, time_s: float) -> None:
         set_time(self._stream, time_s)
-        page = rr.TextDocument(self._brief.markdown(), media_type=rr.MediaType.MARKDOWN)
+        page = rr.TextDocument(self.brief.markdown(), media_type=rr.MediaType.MARKDOWN)
         self._stream.log("/brief", page)
