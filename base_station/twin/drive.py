@@ -8,6 +8,7 @@ import math
 from typing import Any
 
 from base_station.twin.compiled import compiled, inlined
+from base_station.twin.lanes import least, magnitude, most, put, root, signed, take, where
 from base_station.twin.state import (
     DRIVEN,
     I_X,
@@ -28,14 +29,10 @@ from base_station.twin.tile import (
     HELD_N,
     HELD_SIDE,
     HELD_YAW,
-    LARGEST,
     LOSS,
     SIDE_LOSS,
     SIN,
     STUCK,
-    U_X,
-    U_Y,
-    U_YAW,
     YAW_LOSS,
 )
 
@@ -73,130 +70,129 @@ def take_commands(vehicles: Any, tile: Any, lane: int, setpoints: Any, driven: A
 
 
 @inlined
-def drive(vehicles: Any, tile: Any, v: int) -> None:
+def drive(vehicles: Any, tile: Any, v: int, locked: bool) -> None:
     if vehicles.skid[v]:
-        skid_commands(vehicles, tile, v)
+        ux, uy, uyaw = skid_commands(vehicles, tile, v)
     else:
-        omni_commands(vehicles, tile, v)
+        ux, uy, uyaw = omni_commands(vehicles, tile, v, locked)
+    largest = 0.0 * ux + 1.0
     for m in range(vehicles.arm_m.shape[1]):
-        x, y, yaw = vehicles.mix[v, m, 0], vehicles.mix[v, m, 1], vehicles.mix[v, m, 2]
-        for lane in range(tile.shape[2]):
-            output = x * tile[v, U_X, lane] + y * tile[v, U_Y, lane] + yaw * tile[v, U_YAW, lane]
-            tile[v, LARGEST, lane] = max(tile[v, LARGEST, lane], abs(output))
-    accelerate(vehicles, tile, v)
+        output = vehicles.mix[v, m, 0] * ux + vehicles.mix[v, m, 1] * uy
+        if not locked:
+            output = output + vehicles.mix[v, m, 2] * uyaw
+        largest = most(largest, magnitude(output))
+    share = 1.0 / largest
+    accelerate(vehicles, tile, v, share * ux, share * uy, share * uyaw, locked)
 
 
 @inlined
-def omni_commands(vehicles: Any, tile: Any, v: int) -> None:
+def omni_commands(vehicles: Any, tile: Any, v: int, locked: bool) -> Any:
     """Body commands of the velocity loop; a stuck axis reports no velocity."""
     gain = INTEGRATOR_GAIN * vehicles.dt_s
     x_line, x_rolling = 1.0 / vehicles.axis_free_speed_mps[v, 0], vehicles.axis_rolling[v, 0]
     y_line, y_rolling = 1.0 / vehicles.axis_free_speed_mps[v, 1], vehicles.axis_rolling[v, 1]
-    free = 0.0 if vehicles.yaw_locked else 1.0
-    for lane in range(tile.shape[2]):
-        c, s, on = tile[v, COS, lane], tile[v, SIN, lane], tile[v, DRIVEN, lane]
-        sp_n, sp_e = tile[v, SP_NORTH, lane], tile[v, SP_EAST, lane]
-        error_n = sp_n - (1.0 - tile[v, STUCK, lane]) * tile[v, V_NORTH, lane]
-        error_e = sp_e - (1.0 - tile[v, STUCK + 1, lane]) * tile[v, V_EAST, lane]
-        i_x = clipped(tile[v, I_X, lane] + gain * (c * error_n + s * error_e), INTEGRATOR_LIMIT)
-        i_y = clipped(tile[v, I_Y, lane] + gain * (c * error_e - s * error_n), INTEGRATOR_LIMIT)
-        yaw, rate = tile[v, YAW, lane], tile[v, YAW_RATE, lane]
-        sp_yaw = tile[v, SP_YAW, lane] if on > 0.0 else yaw
-        turn = clipped(YAW_GAIN * wrapped(sp_yaw - yaw) - YAW_RATE_GAIN * rate, YAW_LIMIT)
-        tile[v, U_X, lane] = feed_forward(c * sp_n + s * sp_e, x_line, x_rolling) + i_x
-        tile[v, U_Y, lane] = feed_forward(c * sp_e - s * sp_n, y_line, y_rolling) + i_y
-        tile[v, U_YAW, lane] = free * turn
-        tile[v, I_X, lane], tile[v, I_Y, lane] = on * i_x, on * i_y
-        tile[v, SP_YAW, lane] = sp_yaw
-        tile[v, LARGEST, lane] = 1.0
+    c, s, on = take(tile, v, COS), take(tile, v, SIN), take(tile, v, DRIVEN)
+    sp_n, sp_e = take(tile, v, SP_NORTH), take(tile, v, SP_EAST)
+    error_n = sp_n - (1.0 - take(tile, v, STUCK)) * take(tile, v, V_NORTH)
+    error_e = sp_e - (1.0 - take(tile, v, STUCK + 1)) * take(tile, v, V_EAST)
+    i_x = clipped(take(tile, v, I_X) + gain * (c * error_n + s * error_e), INTEGRATOR_LIMIT)
+    i_y = clipped(take(tile, v, I_Y) + gain * (c * error_e - s * error_n), INTEGRATOR_LIMIT)
+    put(tile, v, I_X, on * i_x)
+    put(tile, v, I_Y, on * i_y)
+    turn = 0.0 * on
+    if not locked:
+        yaw = take(tile, v, YAW)
+        sp_yaw = where(on > 0.0, take(tile, v, SP_YAW), yaw)
+        put(tile, v, SP_YAW, sp_yaw)
+        swing = YAW_RATE_GAIN * take(tile, v, YAW_RATE)
+        turn = clipped(YAW_GAIN * wrapped(sp_yaw - yaw) - swing, YAW_LIMIT)
+        turn = (0.0 if vehicles.yaw_locked else 1.0) * turn
+    ux = feed_forward(c * sp_n + s * sp_e, x_line, x_rolling) + i_x
+    uy = feed_forward(c * sp_e - s * sp_n, y_line, y_rolling) + i_y
+    return ux, uy, turn
 
 
 @inlined
-def skid_commands(vehicles: Any, tile: Any, v: int) -> None:
+def skid_commands(vehicles: Any, tile: Any, v: int) -> Any:
     """Turn towards the velocity, and drive as much of it as lies ahead."""
     gain = INTEGRATOR_GAIN * vehicles.dt_s
     line, rolling = 1.0 / vehicles.axis_free_speed_mps[v, 0], vehicles.axis_rolling[v, 0]
-    turn_line, scrub = vehicles.turn_line[v], vehicles.turn_scrub[v]
-    for lane in range(tile.shape[2]):
-        c, s, on = tile[v, COS, lane], tile[v, SIN, lane], tile[v, DRIVEN, lane]
-        sp_n, sp_e = tile[v, SP_NORTH, lane], tile[v, SP_EAST, lane]
-        ahead = c * sp_n + s * sp_e
-        turning = sp_n * sp_n + sp_e * sp_e >= TURNING_MPS * TURNING_MPS
-        ahead = max(0.0, ahead) if turning else ahead
-        seen_n = (1.0 - tile[v, STUCK, lane]) * tile[v, V_NORTH, lane]
-        seen_e = (1.0 - tile[v, STUCK + 1, lane]) * tile[v, V_EAST, lane]
-        i_x = tile[v, I_X, lane] + gain * (ahead - c * seen_n - s * seen_e)
-        i_x = clipped(i_x, INTEGRATOR_LIMIT)
-        yaw = tile[v, YAW, lane]
-        sp_yaw = tile[v, SP_YAW, lane] if on > 0.0 else yaw
-        rate = clipped(HEADING_GAIN * wrapped(sp_yaw - yaw), RATE_LIMIT_RADPS)
-        turn = rate * turn_line + scrub * clipped(rate / SCRUB_RATE_RADPS, 1.0)
-        tile[v, U_X, lane] = feed_forward(ahead, line, rolling) + i_x
-        tile[v, U_Y, lane] = 0.0
-        tile[v, U_YAW, lane] = turn + RATE_GAIN * (rate - tile[v, YAW_RATE, lane])
-        tile[v, I_X, lane] = on * i_x
-        tile[v, SP_YAW, lane] = sp_yaw
-        tile[v, LARGEST, lane] = 1.0
+    c, s, on = take(tile, v, COS), take(tile, v, SIN), take(tile, v, DRIVEN)
+    sp_n, sp_e = take(tile, v, SP_NORTH), take(tile, v, SP_EAST)
+    ahead = c * sp_n + s * sp_e
+    turning = sp_n * sp_n + sp_e * sp_e >= TURNING_MPS * TURNING_MPS
+    ahead = where(turning, most(0.0, ahead), ahead)
+    seen_n = (1.0 - take(tile, v, STUCK)) * take(tile, v, V_NORTH)
+    seen_e = (1.0 - take(tile, v, STUCK + 1)) * take(tile, v, V_EAST)
+    i_x = take(tile, v, I_X) + gain * (ahead - c * seen_n - s * seen_e)
+    i_x = clipped(i_x, INTEGRATOR_LIMIT)
+    put(tile, v, I_X, on * i_x)
+    yaw = take(tile, v, YAW)
+    sp_yaw = where(on > 0.0, take(tile, v, SP_YAW), yaw)
+    put(tile, v, SP_YAW, sp_yaw)
+    rate = clipped(HEADING_GAIN * wrapped(sp_yaw - yaw), RATE_LIMIT_RADPS)
+    scrub = vehicles.turn_scrub[v] * clipped(rate / SCRUB_RATE_RADPS, 1.0)
+    turn = rate * vehicles.turn_line[v] + scrub
+    turn = turn + RATE_GAIN * (rate - take(tile, v, YAW_RATE))
+    return feed_forward(ahead, line, rolling) + i_x, 0.0 * on, turn
 
 
 @inlined
-def accelerate(vehicles: Any, tile: Any, v: int) -> None:
-    """Motors, then what the ground takes: it stops a motion, and never reverses it.
-
-    Commands are scaled down together when a motor would saturate.
-    """
-    dt = vehicles.dt_s
-    free = 0.0 if vehicles.yaw_locked else 1.0
-    for lane in range(tile.shape[2]):
-        c, s = tile[v, COS, lane], tile[v, SIN, lane]
-        north, east, rate = tile[v, V_NORTH, lane], tile[v, V_EAST, lane], tile[v, YAW_RATE, lane]
-        share = 1.0 / tile[v, LARGEST, lane]
-        ux = share * tile[v, U_X, lane]
-        uy = share * tile[v, U_Y, lane]
-        uyaw = share * tile[v, U_YAW, lane]
-        vx, vy = c * north + s * east, c * east - s * north
-        step = dt * tile[v, DRIVEN, lane]
-        x = step * (dot(tile, v, GIVE, lane, ux, uy, uyaw) - dot(tile, v, DAMP, lane, vx, vy, rate))
-        y = step * (
-            dot(tile, v, GIVE + 3, lane, ux, uy, uyaw) - dot(tile, v, DAMP + 3, lane, vx, vy, rate)
-        )
-        yaw = step * (
-            dot(tile, v, GIVE + 6, lane, ux, uy, uyaw) - dot(tile, v, DAMP + 6, lane, vx, vy, rate)
-        )
-        north, east, rate = north + c * x - s * y, east + s * x + c * y, free * (rate + yaw)
-        side = -clipped(c * east - s * north, tile[v, SIDE_LOSS, lane])
+def accelerate(vehicles: Any, tile: Any, v: int, ux: Any, uy: Any, uyaw: Any, locked: bool) -> None:
+    """Motors, then what the ground takes: it stops a motion, and never reverses it."""
+    c, s = take(tile, v, COS), take(tile, v, SIN)
+    north, east = take(tile, v, V_NORTH), take(tile, v, V_EAST)
+    vx, vy = c * north + s * east, c * east - s * north
+    step = vehicles.dt_s * take(tile, v, DRIVEN)
+    x = gained(tile, v, 0, ux, uy, vx, vy)
+    y = gained(tile, v, 1, ux, uy, vx, vy)
+    if not locked:
+        rate = take(tile, v, YAW_RATE)
+        x = x + (take(tile, v, GIVE + 2) * uyaw - take(tile, v, DAMP + 2) * rate)
+        y = y + (take(tile, v, GIVE + 5) * uyaw - take(tile, v, DAMP + 5) * rate)
+        yaw = gained(tile, v, 2, ux, uy, vx, vy)
+        yaw = yaw + (take(tile, v, GIVE + 8) * uyaw - take(tile, v, DAMP + 8) * rate)
+        rate = (0.0 if vehicles.yaw_locked else 1.0) * (rate + step * yaw)
+        scrub = -clipped(rate, take(tile, v, YAW_LOSS))
+        put(tile, v, HELD_YAW, scrub)
+        put(tile, v, YAW_RATE, rate + scrub)
+    x, y = step * x, step * y
+    north, east = north + c * x - s * y, east + s * x + c * y
+    if vehicles.grips[v]:
+        side = -clipped(c * east - s * north, take(tile, v, SIDE_LOSS))
+        put(tile, v, HELD_SIDE, side)
         north, east = north - s * side, east + c * side
-        speed = math.sqrt(north * north + east * east)
-        taken = -min(1.0, tile[v, LOSS, lane] / max(speed, TINY))
-        scrub = -clipped(rate, tile[v, YAW_LOSS, lane])
-        tile[v, HELD_SIDE, lane], tile[v, HELD_YAW, lane] = side, scrub
-        tile[v, HELD_N, lane], tile[v, HELD_E, lane] = taken * north, taken * east
-        tile[v, V_NORTH, lane], tile[v, V_EAST, lane] = north + taken * north, east + taken * east
-        tile[v, YAW_RATE, lane] = rate + scrub
+    speed = root(north * north + east * east)
+    taken = -least(1.0, take(tile, v, LOSS) / most(speed, TINY))
+    put(tile, v, HELD_N, taken * north)
+    put(tile, v, HELD_E, taken * east)
+    put(tile, v, V_NORTH, north + taken * north)
+    put(tile, v, V_EAST, east + taken * east)
 
 
-@compiled
-def feed_forward(setpoint_mps: float, line: float, rolling: float) -> float:
+@inlined
+def gained(tile: Any, v: int, i: int, ux: Any, uy: Any, vx: Any, vy: Any) -> Any:
+    """Acceleration along body axis i by commands and velocities of x and y."""
+    give, damp = GIVE + 3 * i, DAMP + 3 * i
+    given = take(tile, v, give) * ux + take(tile, v, give + 1) * uy
+    return given - (take(tile, v, damp) * vx + take(tile, v, damp + 1) * vy)
+
+
+@inlined
+def feed_forward(setpoint_mps: Any, line: float, rolling: float) -> Any:
     """Output that should hold the set-point: the motors' speed line plus rolling resistance."""
-    against = math.copysign(rolling, setpoint_mps)
-    return setpoint_mps * line + (against if abs(setpoint_mps) >= STANDSTILL_MPS else 0.0)
+    against = signed(rolling, setpoint_mps)
+    moving = magnitude(setpoint_mps) >= STANDSTILL_MPS
+    return setpoint_mps * line + where(moving, against, 0.0)
 
 
-@compiled
-def dot(tile: Any, v: int, column: int, lane: int, x: float, y: float, z: float) -> float:
-    result: float = (
-        tile[v, column, lane] * x + tile[v, column + 1, lane] * y + tile[v, column + 2, lane] * z
-    )
-    return result
+@inlined
+def clipped(value: Any, limit: Any) -> Any:
+    return most(-limit, least(limit, value))
 
 
-@compiled
-def clipped(value: float, limit: float) -> float:
-    return max(-limit, min(limit, value))
-
-
-@compiled
-def wrapped(angle_rad: float) -> float:
+@inlined
+def wrapped(angle_rad: Any) -> Any:
     """An angle within (-3 pi, 3 pi) in [-pi, pi)."""
-    angle_rad = angle_rad - 2.0 * math.pi if angle_rad >= math.pi else angle_rad
-    return angle_rad + 2.0 * math.pi if angle_rad < -math.pi else angle_rad
+    angle_rad = where(angle_rad >= math.pi, angle_rad - 2.0 * math.pi, angle_rad)
+    return where(angle_rad < -math.pi, angle_rad + 2.0 * math.pi, angle_rad)

@@ -1,8 +1,8 @@
 """The twin's dynamics: one deterministic kernel, batched over environments x hypotheses.
 
 A step: autopilot, motors, the ground, contacts (sequential impulses), positions. Worlds are moved
-LANES at a time, each in a lane of a tile (`tile`): one instruction serves all of them. Large
-fleets are moved one world at a time, by the same functions with a single lane.
+LANES at a time, each in a lane of a tile (`tile`): one instruction serves all of them (`lanes`).
+Large fleets are moved one world at a time, by the same functions with floats.
 """
 
 import math
@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 
 from base_station.twin.compiled import cached, compiled, inlined, sources
-from base_station.twin.contact import CONTACT_COLUMNS, IMPULSE, find_contacts
+from base_station.twin.contact import CONTACT_COLUMNS, IMPULSE, find_pairs, find_walls
 from base_station.twin.drive import drive, take_commands, wrapped
+from base_station.twin.lanes import LANES, put, take
 from base_station.twin.search import CELLS_ABOVE, all_pairs, near_pairs, pair_capacity
 from base_station.twin.solve import solve_contacts
 from base_station.twin.state import EAST, NORTH, STATE_SIZE, V_EAST, V_NORTH, YAW, YAW_RATE
-from base_station.twin.tile import COLUMNS, FRICTION, WORLD_COLUMNS, face, gather
-
-LANES = 16
+from base_station.twin.tile import COLUMNS, FRICTION, aligned, face, gather
 
 
 @inlined
@@ -32,49 +31,55 @@ def advance_all(
     steps: int,
     impulses: Any,
     walls: Any,
-    lanes: int,
+    tile: Any,
+    columns: Any,
+    contacts: Any,
+    rows: Any,
+    locked: bool,
 ) -> None:
-    """`steps` of dt for all rows of `states`, in place; adds to `impulses` and `walls`."""
-    rows, count = states.shape[0], states.shape[1]
+    """`steps` of dt for all rows of `states`, in place; adds to `impulses` and `walls`.
+
+    `columns` and `rows` are the tile and the contacts as `take` wants them. `locked`: nothing
+    turns, and what only matters to what turns is left out.
+    """
+    batch, count, lanes = states.shape[0], states.shape[1], tile.shape[2]
     draws, hypotheses = parameters.mass_kg.shape[0], faults.power.shape[0]
-    tile = np.zeros((count + 1, COLUMNS, lanes))
     draw, hypothesis = np.zeros(lanes, np.int64), np.zeros(lanes, np.int64)
-    due, worlds = np.empty(lanes, np.int64), np.zeros((WORLD_COLUMNS, lanes))
+    due = np.empty(lanes, np.int64)
     pairs = np.empty((pair_capacity(count), 2), np.uintp)
     found = all_pairs(count, pairs) if count <= CELLS_ABOVE else 0
-    room = pairs.shape[0] + (2 + vehicles.obstacles_m.shape[0]) * count
-    contacts = np.empty((room + 1, CONTACT_COLUMNS, lanes))
-    bodies = np.empty((room, 2), np.uintp)
+    bodies = np.empty((contacts.shape[0], 2), np.uintp)
     same = draws == 1 and lanes % hypotheses == 0  # every tile has the same constants
-    for first in range(0, rows, lanes):
+    for first in range(0, batch, lanes):
         for lane in range(lanes):
-            b = min(first + lane, rows - 1)  # lanes past the end repeat the last row
-            draw[lane], hypothesis[lane] = b * draws // rows, b % hypotheses
-            worlds[FRICTION, lane] = parameters.friction[draw[lane]]
+            b = min(first + lane, batch - 1)  # lanes past the end repeat the last row
+            draw[lane], hypothesis[lane] = b * draws // batch, b % hypotheses
+            tile[count, FRICTION, lane] = parameters.friction[draw[lane]]
             due[lane] = min(round(parameters.latency_s[draw[lane]] / vehicles.dt_s), steps)
             load(states[b], tile, lane)
         if first == 0 or not same:
             gather(vehicles, parameters, faults, draw, hypothesis, tile)
-        face(tile)
+        face(columns)
         for step in range(steps + 1):
             for lane in range(lanes):
                 if due[lane] == step:  # a latency longer than the call is cut to it
-                    b = min(first + lane, rows - 1)
+                    b = min(first + lane, batch - 1)
                     take_commands(vehicles, tile, lane, setpoints[b], driven[b])
             if step == steps:
                 break
             for v in range(count):
-                drive(vehicles, tile, v)
+                drive(vehicles, columns, v, locked)
             if count > CELLS_ABOVE:
                 found = near_pairs(tile, vehicles.radius_m, vehicles.reach_m, pairs)
-            n = find_contacts(vehicles, tile, pairs, found, contacts, bodies, worlds)
+            between = find_pairs(vehicles, columns, pairs, found, rows, bodies)
+            n = find_walls(vehicles, columns, between, rows, bodies)
             if n > 0:
-                solve_contacts(vehicles, tile, contacts, bodies, n, worlds)
+                solve_contacts(vehicles, columns, rows, bodies, between, n, locked)
                 note_contacts(contacts, bodies, n, first, impulses, walls)
-            move(tile, vehicles.dt_s)
-            if not vehicles.yaw_locked:
-                face(tile)
-        for lane in range(min(lanes, rows - first)):
+            move(columns, vehicles.dt_s, locked)
+            if not locked:
+                face(columns)
+        for lane in range(min(lanes, batch - first)):
             store(tile, lane, states[first + lane])
 
 
@@ -94,12 +99,12 @@ def store(tile: Any, lane: int, state: Any) -> None:
 
 
 @inlined
-def move(tile: Any, dt: float) -> None:
+def move(tile: Any, dt: float, locked: bool) -> None:
     for v in range(tile.shape[0] - 1):
-        for lane in range(tile.shape[2]):
-            tile[v, NORTH, lane] += tile[v, V_NORTH, lane] * dt
-            tile[v, EAST, lane] += tile[v, V_EAST, lane] * dt
-            tile[v, YAW, lane] = wrapped(tile[v, YAW, lane] + tile[v, YAW_RATE, lane] * dt)
+        put(tile, v, NORTH, take(tile, v, NORTH) + take(tile, v, V_NORTH) * dt)
+        put(tile, v, EAST, take(tile, v, EAST) + take(tile, v, V_EAST) * dt)
+        if not locked:
+            put(tile, v, YAW, wrapped(take(tile, v, YAW) + take(tile, v, YAW_RATE) * dt))
 
 
 @compiled
@@ -120,7 +125,15 @@ def note_contacts(
                     impulses[first + lane, j, i] += impulse
 
 
-def _entry(version: int, lanes: int) -> Any:
+@compiled
+def room(vehicles: Any) -> int:
+    """How many contacts there may be."""
+    count = vehicles.radius_m.shape[0]
+    result: int = pair_capacity(count) + (2 + vehicles.obstacles_m.shape[0]) * count
+    return result
+
+
+def _side_by_side(version: int, locked: bool) -> Any:
     def advance_rows(
         vehicles: Any,
         parameters: Any,
@@ -133,6 +146,8 @@ def _entry(version: int, lanes: int) -> Any:
         walls: Any,
     ) -> None:
         if version != 0:  # read, so that the cache knows it
+            tile = aligned(states.shape[1] + 1, COLUMNS, LANES)
+            contacts = aligned(room(vehicles), CONTACT_COLUMNS, LANES)
             advance_all(
                 vehicles,
                 parameters,
@@ -143,16 +158,60 @@ def _entry(version: int, lanes: int) -> Any:
                 steps,
                 impulses,
                 walls,
-                lanes,
+                tile,
+                tile,
+                contacts,
+                contacts,
+                locked,
             )
 
     return cached(advance_rows)
 
 
-_side_by_side, _alone = _entry(sources(), LANES), _entry(sources(), 1)
+def _alone(version: int, locked: bool) -> Any:
+    def advance_rows(
+        vehicles: Any,
+        parameters: Any,
+        faults: Any,
+        states: Any,
+        setpoints: Any,
+        driven: Any,
+        steps: int,
+        impulses: Any,
+        walls: Any,
+    ) -> None:
+        if version != 0:  # read, so that the cache knows it
+            blocks, capacity = states.shape[1] + 1, room(vehicles)
+            tile = aligned(blocks, COLUMNS, 1)
+            contacts = aligned(capacity, CONTACT_COLUMNS, 1)
+            advance_all(
+                vehicles,
+                parameters,
+                faults,
+                states,
+                setpoints,
+                driven,
+                steps,
+                impulses,
+                walls,
+                tile,
+                tile.reshape(blocks, COLUMNS),
+                contacts,
+                contacts.reshape(capacity, CONTACT_COLUMNS),
+                locked,
+            )
+
+    return cached(advance_rows)
+
+
+_KERNELS = {
+    (alone, locked): entry(sources(), locked)
+    for alone, entry in ((False, _side_by_side), (True, _alone))
+    for locked in (False, True)
+}
 
 
 def advance_rows(vehicles: Any, *rest: Any) -> None:
     """As `advance_all`, with as many lanes as suit the size of the fleet."""
-    kernel = _side_by_side if len(vehicles.radius_m) <= CELLS_ABOVE else _alone
-    kernel(vehicles, *rest)
+    locked = bool(vehicles.yaw_locked and not vehicles.skid.any())
+    _KERNELS[len(vehicles.radius_m) > CELLS_ABOVE, locked](vehicles, *rest)

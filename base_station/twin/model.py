@@ -30,6 +30,7 @@ class Vehicles(NamedTuple):
     axis_free_speed_mps: Array  # [V, 2] feed-forward of the velocity loop: output per m/s ...
     axis_rolling: Array  # [V, 2] ... and the output that overcomes rolling resistance
     skid: Flags  # [V] steers by turning
+    grips: Flags  # [V] wheels that can't roll sideways: without them, no side force is looked at
     turn_line: Array  # [V] feed-forward of a skid-steered turn: output per rad/s ...
     turn_scrub: Array  # [V] ... and the output that overcomes scrub
     bounds_m: Array  # [4] north min, north max, east min, east max
@@ -101,6 +102,7 @@ class FleetModel:
                 [[_axis_rolling(f, axis) for axis in ("x", "y")] for f in frames]
             ),
             skid=np.array([f.steering == "skid" for f in frames]),
+            grips=np.array([f.side_grip_n > 0.0 for f in frames]),
             turn_line=np.array([_turn(f)[0] for f in frames]),
             turn_scrub=np.array([_turn(f)[1] for f in frames]),
             bounds_m=_bounds_m(view.arena),
@@ -191,7 +193,8 @@ def fault_rows(model: FleetModel, hypotheses: Sequence[Hypothesis]) -> FaultArra
 
 
 def _bounds_m(area: Rectangle) -> Array:
-    return np.array([area.north_min_m, area.north_max_m, area.east_min_m, area.east_max_m])
+    sides_m = [area.north_min_m, area.north_max_m, area.east_min_m, area.east_max_m]
+    return np.array(sides_m, dtype=np.float64)
 
 
 def _strokes_m(obstacles: Sequence[Obstacle]) -> Array:

@@ -4,129 +4,176 @@ Every impulse is bounded in sum, not in its steps: contacts never pull, rims rub
 bound, and the ground holds back what is pushed too weakly, as in the world.
 """
 
-import math
 from typing import Any
-
-import numpy as np
 
 from base_station.twin.compiled import inlined
 from base_station.twin.contact import (
-    GIVEN_E,
-    GIVEN_N,
-    GIVEN_RUB,
     IMPULSE,
-    LIGHT_1,
-    LIGHT_2,
     MAY_CLOSE,
     NORMAL_E,
     NORMAL_MASS,
     NORMAL_N,
     RIM_MASS,
     RUB,
-    SPIN_1,
-    SPIN_2,
 )
 from base_station.twin.drive import TINY, clipped
+from base_station.twin.lanes import anywhere, least, magnitude, most, put, root, take, where
 from base_station.twin.state import V_EAST, V_NORTH, YAW_RATE
 from base_station.twin.tile import (
     BUSY,
-    CHANGE,
     COS,
     FRICTION,
     HELD_E,
     HELD_N,
     HELD_SIDE,
     HELD_YAW,
+    INVERSE_INERTIA,
+    INVERSE_MASS,
     LOSS,
     SIDE_LOSS,
     SIN,
     YAW_LOSS,
 )
 
-ITERATIONS = 12  # enough for a push through a chain of three
+ITERATIONS = 8
+EAGER = 1.3  # over-relaxation: as exact in 8 rounds as plain ones in 12
 SETTLED_NS = 1e-4  # no impulse changes by more: 0.01 mm/s of a rover
 
 
 @inlined
 def solve_contacts(
-    vehicles: Any, tile: Any, contacts: Any, bodies: Any, n: int, worlds: Any
+    vehicles: Any, tile: Any, contacts: Any, bodies: Any, between: int, n: int, locked: bool
 ) -> None:
-    """Change velocities so that no gap closes further than to touch. A lane that has settled
-    (BUSY 0) stays as it is, so that it does not matter which worlds share a tile."""
-    radius, ground = vehicles.radius_m, tile.shape[0] - 1
+    """Change velocities so that no gap closes further than to touch. The first `between` of `n`
+    contacts are those of two vehicles. A lane that has settled (BUSY 0) stays as it is, so that it
+    does not matter which worlds share a tile."""
+    ground = tile.shape[0] - 1
+    friction, busy = take(tile, ground, FRICTION), take(tile, ground, BUSY)
+    eager = 1.0
+    i: Any
+    j: Any
     for _ in range(ITERATIONS):
-        worlds[CHANGE] = 0.0
-        for row in range(n):
-            k: Any = np.uintp(row)
-            i, j = bodies[k, 0], bodies[k, 1]
-            push(tile, i, j, contacts, k, radius[i], radius[j] if j < ground else 0.0, worlds)
-            for lane in range(tile.shape[2]):
-                light, spin = contacts[k, LIGHT_1, lane], contacts[k, SPIN_1, lane]
-                tile[i, V_NORTH, lane] -= light * contacts[k, GIVEN_N, lane]
-                tile[i, V_EAST, lane] -= light * contacts[k, GIVEN_E, lane]
-                tile[i, YAW_RATE, lane] -= spin * contacts[k, GIVEN_RUB, lane]
-            for lane in range(tile.shape[2]):
-                light, spin = contacts[k, LIGHT_2, lane], contacts[k, SPIN_2, lane]
-                tile[j, V_NORTH, lane] += light * contacts[k, GIVEN_N, lane]
-                tile[j, V_EAST, lane] += light * contacts[k, GIVEN_E, lane]
-                tile[j, YAW_RATE, lane] -= spin * contacts[k, GIVEN_RUB, lane]
+        change = 0.0 * friction
+        for row in range(between):
+            i = bodies[row, 0]
+            j = bodies[row, 1]
+            given = push(vehicles, tile, i, j, contacts, row, friction, busy, eager, locked)
+            change = most(change, given)
+        for row in range(between, n):
+            i = bodies[row, 0]
+            given = push_off(vehicles, tile, i, contacts, row, friction, busy, eager, locked)
+            change = most(change, given)
         for v in range(ground):
-            hold(tile, v, worlds)
-        going = 0
-        for lane in range(tile.shape[2]):
-            going += worlds[CHANGE, lane] > SETTLED_NS
-            worlds[BUSY, lane] = 1.0 if worlds[CHANGE, lane] > SETTLED_NS else 0.0
-        if going == 0:
+            hold(vehicles, tile, v, busy, locked)
+        going = change > SETTLED_NS
+        if not anywhere(going):
             break
+        busy = where(going, 1.0, 0.0)
+        eager = EAGER  # not at first: what a single plain round settles is settled then
 
 
 @inlined
 def push(
-    tile: Any, i: int, j: int, contacts: Any, k: int, rim_i: float, rim_j: float, worlds: Any
-) -> None:
-    """The impulse of one contact: against the approach, then against the slip of the rims."""
-    for lane in range(tile.shape[2]):
-        nn, ne = contacts[k, NORMAL_N, lane], contacts[k, NORMAL_E, lane]
-        north = tile[i, V_NORTH, lane] - tile[j, V_NORTH, lane]
-        east = tile[i, V_EAST, lane] - tile[j, V_EAST, lane]
-        turning = rim_i * tile[i, YAW_RATE, lane] + rim_j * tile[j, YAW_RATE, lane]
-        closing = north * nn + east * ne - contacts[k, MAY_CLOSE, lane]
-        before = contacts[k, IMPULSE, lane]
-        impulse = max(0.0, before + closing * contacts[k, NORMAL_MASS, lane])
-        slip = east * nn - north * ne + turning
-        rubbed = contacts[k, RUB, lane]
-        bound = worlds[FRICTION, lane] * impulse
-        rub = clipped(rubbed + slip * contacts[k, RIM_MASS, lane], bound)
-        normal = worlds[BUSY, lane] * (impulse - before)
-        across = worlds[BUSY, lane] * (rub - rubbed)
-        contacts[k, GIVEN_N, lane] = nn * normal - ne * across
-        contacts[k, GIVEN_E, lane] = ne * normal + nn * across
-        contacts[k, GIVEN_RUB, lane] = across
-        contacts[k, IMPULSE, lane] = before + normal
-        contacts[k, RUB, lane] = rubbed + across
-        worlds[CHANGE, lane] = max(worlds[CHANGE, lane], max(abs(normal), abs(across)))
+    vehicles: Any,
+    tile: Any,
+    i: int,
+    j: int,
+    contacts: Any,
+    k: int,
+    friction: Any,
+    busy: Any,
+    eager: float,
+    locked: bool,
+) -> Any:
+    """The impulse of two vehicles: against the approach, then against the slip of the rims.
+
+    Returns by how much it has changed (N s)."""
+    nn, ne = take(contacts, k, NORMAL_N), take(contacts, k, NORMAL_E)
+    light_i, light_j = take(tile, i, INVERSE_MASS), take(tile, j, INVERSE_MASS)
+    north_i, north_j = take(tile, i, V_NORTH), take(tile, j, V_NORTH)
+    east_i, east_j = take(tile, i, V_EAST), take(tile, j, V_EAST)
+    north, east = north_i - north_j, east_i - east_j
+    slip = east * nn - north * ne
+    if not locked:
+        rim_i, rim_j = vehicles.radius_m[i], vehicles.radius_m[j]
+        rate_i, rate_j = take(tile, i, YAW_RATE), take(tile, j, YAW_RATE)
+        slip = slip + (rim_i * rate_i + rim_j * rate_j)
+    closing = north * nn + east * ne - take(contacts, k, MAY_CLOSE)
+    normal, across = bounded(contacts, k, closing, slip, friction, busy, eager)
+    give_n, give_e = nn * normal - ne * across, ne * normal + nn * across
+    put(tile, i, V_NORTH, north_i - light_i * give_n)
+    put(tile, i, V_EAST, east_i - light_i * give_e)
+    put(tile, j, V_NORTH, north_j + light_j * give_n)
+    put(tile, j, V_EAST, east_j + light_j * give_e)
+    if not locked:
+        put(tile, i, YAW_RATE, rate_i - rim_i * take(tile, i, INVERSE_INERTIA) * across)
+        put(tile, j, YAW_RATE, rate_j - rim_j * take(tile, j, INVERSE_INERTIA) * across)
+    return most(magnitude(normal), magnitude(across))
 
 
 @inlined
-def hold(tile: Any, v: int, worlds: Any) -> None:
+def push_off(
+    vehicles: Any,
+    tile: Any,
+    i: int,
+    contacts: Any,
+    k: int,
+    friction: Any,
+    busy: Any,
+    eager: float,
+    locked: bool,
+) -> Any:
+    """The same against the ground, which does not move."""
+    nn, ne = take(contacts, k, NORMAL_N), take(contacts, k, NORMAL_E)
+    light, north, east = take(tile, i, INVERSE_MASS), take(tile, i, V_NORTH), take(tile, i, V_EAST)
+    slip = east * nn - north * ne
+    if not locked:
+        rim, rate = vehicles.radius_m[i], take(tile, i, YAW_RATE)
+        slip = slip + rim * rate
+    closing = north * nn + east * ne - take(contacts, k, MAY_CLOSE)
+    normal, across = bounded(contacts, k, closing, slip, friction, busy, eager)
+    put(tile, i, V_NORTH, north - light * (nn * normal - ne * across))
+    put(tile, i, V_EAST, east - light * (ne * normal + nn * across))
+    if not locked:
+        put(tile, i, YAW_RATE, rate - rim * take(tile, i, INVERSE_INERTIA) * across)
+    return most(magnitude(normal), magnitude(across))
+
+
+@inlined
+def bounded(
+    contacts: Any, k: int, closing: Any, slip: Any, friction: Any, busy: Any, eager: float
+) -> Any:
+    """What the impulses change by, along the normal and across: bounded in sum, and noted."""
+    before, rubbed = take(contacts, k, IMPULSE), take(contacts, k, RUB)
+    impulse = most(0.0, before + eager * closing * take(contacts, k, NORMAL_MASS))
+    rub = clipped(rubbed + slip * take(contacts, k, RIM_MASS), friction * impulse)
+    normal, across = busy * (impulse - before), busy * (rub - rubbed)
+    put(contacts, k, IMPULSE, before + normal)
+    put(contacts, k, RUB, rubbed + across)
+    return normal, across
+
+
+@inlined
+def hold(vehicles: Any, tile: Any, v: int, busy: Any, locked: bool) -> None:
     """What the ground takes of a velocity, afresh: no more in sum than it can hold."""
-    for lane in range(tile.shape[2]):
-        c, s = tile[v, COS, lane], tile[v, SIN, lane]
-        north, east, rate = tile[v, V_NORTH, lane], tile[v, V_EAST, lane], tile[v, YAW_RATE, lane]
-        before = tile[v, HELD_YAW, lane]
-        scrub = clipped(before - rate, tile[v, YAW_LOSS, lane]) - before
-        before = tile[v, HELD_SIDE, lane]
-        side = clipped(before - (c * east - s * north), tile[v, SIDE_LOSS, lane]) - before
-        side, scrub = worlds[BUSY, lane] * side, worlds[BUSY, lane] * scrub
+    north, east = take(tile, v, V_NORTH), take(tile, v, V_EAST)
+    if not locked:
+        rate, before = take(tile, v, YAW_RATE), take(tile, v, HELD_YAW)
+        scrub = busy * (clipped(before - rate, take(tile, v, YAW_LOSS)) - before)
+        put(tile, v, YAW_RATE, rate + scrub)
+        put(tile, v, HELD_YAW, before + scrub)
+    if vehicles.grips[v]:
+        c, s, held = take(tile, v, COS), take(tile, v, SIN), take(tile, v, HELD_SIDE)
+        wanted = held - (c * east - s * north)
+        side = busy * (clipped(wanted, take(tile, v, SIDE_LOSS)) - held)
+        put(tile, v, HELD_SIDE, held + side)
         north, east = north - s * side, east + c * side
-        held_n, held_e = tile[v, HELD_N, lane], tile[v, HELD_E, lane]
-        wanted_n, wanted_e = held_n - north, held_e - east
-        size = math.sqrt(wanted_n * wanted_n + wanted_e * wanted_e)
-        share = min(1.0, tile[v, LOSS, lane] / max(size, TINY))
-        roll_n = worlds[BUSY, lane] * (share * wanted_n - held_n)
-        roll_e = worlds[BUSY, lane] * (share * wanted_e - held_e)
-        tile[v, V_NORTH, lane], tile[v, V_EAST, lane] = north + roll_n, east + roll_e
-        tile[v, YAW_RATE, lane] = rate + scrub
-        tile[v, HELD_N, lane], tile[v, HELD_E, lane] = held_n + roll_n, held_e + roll_e
-        tile[v, HELD_SIDE, lane] += side
-        tile[v, HELD_YAW, lane] += scrub
+    held_n, held_e = take(tile, v, HELD_N), take(tile, v, HELD_E)
+    wanted_n, wanted_e = held_n - north, held_e - east
+    size = root(wanted_n * wanted_n + wanted_e * wanted_e)
+    share = least(1.0, take(tile, v, LOSS) / most(size, TINY))
+    roll_n, roll_e = busy * (share * wanted_n - held_n), busy * (share * wanted_e - held_e)
+    put(tile, v, V_NORTH, north + roll_n)
+    put(tile, v, V_EAST, east + roll_e)
+    put(tile, v, HELD_N, held_n + roll_n)
+    put(tile, v, HELD_E, held_e + roll_e)

@@ -2,8 +2,8 @@
 
 A tile is [V + 1, COLUMNS, lanes]: block `v` has the state of vehicle v (columns as in
 `state`), what it needs per step (below), and scratch. The last block is the ground that walls and
-obstacles stand on: it has no inverse mass, and never moves. Lanes are innermost, and loops over
-them have no branches: so each becomes a few vector instructions.
+obstacles stand on: it has no inverse mass, never moves, and keeps what belongs to a world as a
+whole. Lanes are innermost: a column is a few vector registers (`lanes`).
 
 Acceleration (body x, y, yaw) = GIVE @ commands - DAMP @ velocity, each 3 x 3, all motors together.
 """
@@ -11,39 +11,47 @@ Acceleration (body x, y, yaw) = GIVE @ commands - DAMP @ velocity, each 3 x 3, a
 import math
 from typing import Any
 
+import numpy as np
+
 from base_station.twin.compiled import compiled, inlined
+from base_station.twin.lanes import put, take
 from base_station.twin.state import STATE_SIZE, YAW
 
 COS = STATE_SIZE  # of the yaw
 SIN = COS + 1
-U_X = COS + 2  # commands of the autopilot: body x, y, yaw
-U_Y = COS + 3
-U_YAW = COS + 4
-LARGEST = COS + 5  # output of a motor that these would take
-HELD_N = COS + 6  # what the ground has taken off the velocity in this step: rolling, m/s ...
-HELD_E = COS + 7
-HELD_SIDE = COS + 8  # ... side grip, m/s along body y ...
-HELD_YAW = COS + 9  # ... and scrub, rad/s
-INVERSE_MASS = COS + 10
-INVERSE_INERTIA = COS + 11  # 0 when the yaw is locked
-LOSS = COS + 12  # speed lost to rolling resistance per step, m/s
-SIDE_LOSS = COS + 13  # the same for side grip
-YAW_LOSS = COS + 14  # and scrub, rad/s
-STUCK = COS + 15  # 2 columns: the GPS axis (north, east) is frozen
-PULL = COS + 17  # of one motor while they are gathered: stall force, weak or reversed, and ...
-SLOWING = COS + 18  # ... stall force over free speed
-GIVE = COS + 19  # 9 columns
+HELD_N = COS + 2  # what the ground has taken off the velocity in this step: rolling, m/s ...
+HELD_E = COS + 3
+HELD_SIDE = COS + 4  # ... side grip, m/s along body y ...
+HELD_YAW = COS + 5  # ... and scrub, rad/s
+INVERSE_MASS = COS + 6
+INVERSE_INERTIA = COS + 7  # 0 when the yaw is locked
+LOSS = COS + 8  # speed lost to rolling resistance per step, m/s
+SIDE_LOSS = COS + 9  # the same for side grip
+YAW_LOSS = COS + 10  # and scrub, rad/s
+STUCK = COS + 11  # 2 columns: the GPS axis (north, east) is frozen
+PULL = COS + 13  # of one motor while they are gathered: stall force, weak or reversed, and ...
+SLOWING = COS + 14  # ... stall force over free speed
+GIVE = COS + 15  # 9 columns
 DAMP = GIVE + 9  # 9 columns
 COLUMNS = DAMP + 9
 
-# of what belongs to a world as a whole: `worlds` [WORLD_COLUMNS, lanes]
-FRICTION = 0  # of contacts
-BUSY = 1  # 1: contacts are still to be settled
-CHANGE = 2  # N s, the largest of an impulse in this round
-WORLD_COLUMNS = 3
+# of the ground's block
+FRICTION = PULL  # of this world's contacts
+BUSY = SLOWING  # 1: contacts are still to be settled
+
+ALIGNED_BYTES = 64  # a vector register, and a line of the processor's cache
 
 S_3, S_5, S_7, S_9, S_11, S_13 = (1.0 / math.factorial(n) for n in (3, 5, 7, 9, 11, 13))
 C_2, C_4, C_6, C_8, C_10, C_12, C_14 = (1.0 / math.factorial(n) for n in range(2, 15, 2))
+
+
+@compiled
+def aligned(rows: int, columns: int, lanes: int) -> Any:
+    """Zeros [rows, columns, lanes] of which no vector crosses a line of the cache."""
+    spare, size = ALIGNED_BYTES // 8, rows * columns * lanes
+    raw = np.zeros(size + spare)
+    start = (-raw.ctypes.data // 8) % spare
+    return raw[start : start + size].reshape(rows, columns, lanes)
 
 
 @inlined
@@ -112,13 +120,11 @@ def face(tile: Any) -> None:
 
     Series at a quarter of the angle, doubled twice: libm's functions take one number at a time.
     """
-    for v in range(tile.shape[0]):
-        for lane in range(tile.shape[2]):
-            x = 0.25 * tile[v, YAW, lane]
-            q = -x * x
-            s = x * (1.0 + q * (S_3 + q * (S_5 + q * (S_7 + q * (S_9 + q * (S_11 + q * S_13))))))
-            c = 1.0 + q * (
-                C_2 + q * (C_4 + q * (C_6 + q * (C_8 + q * (C_10 + q * (C_12 + q * C_14)))))
-            )
-            s, c = 2.0 * s * c, 1.0 - 2.0 * s * s
-            tile[v, COS, lane], tile[v, SIN, lane] = 1.0 - 2.0 * s * s, 2.0 * s * c
+    for v in range(tile.shape[0] - 1):
+        x = 0.25 * take(tile, v, YAW)
+        q = -x * x
+        s = x * (1.0 + q * (S_3 + q * (S_5 + q * (S_7 + q * (S_9 + q * (S_11 + q * S_13))))))
+        c = 1.0 + q * (C_2 + q * (C_4 + q * (C_6 + q * (C_8 + q * (C_10 + q * (C_12 + q * C_14))))))
+        s, c = 2.0 * s * c, 1.0 - 2.0 * s * s
+        put(tile, v, COS, 1.0 - 2.0 * s * s)
+        put(tile, v, SIN, 2.0 * s * c)
