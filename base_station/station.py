@@ -29,7 +29,7 @@ from base_station.phases import (
     Settling,
 )
 from base_station.planning.requests import PlanReady, PlanRequest
-from base_station.receiving.fleet import LINK_LOST_WALL_S
+from base_station.receiving.fleet import LINK_GIVEN_UP_WALL_S, LINK_LOST_WALL_S
 from base_station.receiving.preparing import Preparation
 from base_station.receiving.telemetry import Frame
 from base_station.records import Event, Snapshot
@@ -87,6 +87,7 @@ class Station:
         self._beats_s = (float("-inf"), float("-inf"))  # last heartbeat: wall, fleet
         self._asked_time_s = float("-inf")
         self._stepped_wall_s: float | None = None
+        self._silent: frozenset[int] = frozenset()  # vehicles that have not been heard for long
         self._gap: Gap | None = None
 
     def interrupted(self) -> None:
@@ -253,10 +254,13 @@ class Station:
             self.desk.stop("takeover")
 
     def _mind_the_links(self, wall_s: float) -> None:
-        silent = () if self.desk.ended else self.desk.fleet.silent(wall_s)
-        if silent:
-            names = ", ".join(self.desk.view.fleet[i].name for i in silent)
+        """A vehicle that is not heard is waited for, and only then given up: radios fade."""
+        fleet, before = self.desk.fleet, self._silent
+        self._silent = frozenset() if self.desk.ended else frozenset(fleet.silent(wall_s))
+        if self._silent - before:
+            names = ", ".join(self.desk.view.fleet[i].name for i in sorted(self._silent))
             self.desk.say("link", f"no word from {names} for {LINK_LOST_WALL_S:.0f} s")
+        if self._silent and fleet.silent(wall_s, LINK_GIVEN_UP_WALL_S):
             self.desk.stop("a link is lost")
 
     def _mind_the_time(self) -> None:

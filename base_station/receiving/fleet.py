@@ -11,6 +11,7 @@ from hil.scenario import StationView
 
 WAIT_FOR_LATE_S = 0.3  # fleet time; then a tick goes on without the vehicle that is late
 LINK_LOST_WALL_S = 5.0
+LINK_GIVEN_UP_WALL_S = 60.0
 ANSWER_WITHIN_S = 30.0  # a TIMESYNC answer to what was asked later than now, or long ago, is none
 LONG_GAP_S = 6.0  # after that long without a command nothing moves: no need to tick through it
 
@@ -110,10 +111,10 @@ class Fleet:
         times = [t.newest_s() for t in self.tracks]
         return min(times) >= time_s - 1e-3 or max(times) >= time_s + WAIT_FOR_LATE_S
 
-    def silent(self, wall_s: float) -> list[int]:
-        """Vehicles not heard of for LINK_LOST_WALL_S, once they had been."""
+    def silent(self, wall_s: float, for_s: float = LINK_LOST_WALL_S) -> list[int]:
+        """Vehicles not heard of for so long, once they had been."""
         return [
             i
             for i, t in enumerate(self.tracks)
-            if t.status.heard and wall_s - t.last_heard_wall_s > LINK_LOST_WALL_S
+            if t.status.heard and wall_s - t.last_heard_wall_s > for_s
         ]

@@ -64,3 +64,17 @@ def test_the_first_tick_may_take_longer() -> None:
     watchdog.check(3.0, 3.0, None, FIRST_TICK_WITHIN_S)
     with pytest.raises(ProcessDiedError, match="base-station hangs"):
         watchdog.check(3.0, 3.0, None, FIRST_TICK_WITHIN_S + 2.0)
+
+
+def test_a_station_started_again_has_the_time_of_a_first_tick() -> None:
+    watchdog = Watchdog(1.0, 0.0)
+    watchdog.check(10.5, 10.5, 10.0, 1.0)
+    watchdog.rest(100.0)
+    watchdog.check(12.0, 10.5, 10.0, 100.0)  # the world went on meanwhile
+    watchdog.check(12.0, 10.5, 10.0, 100.0 + FIRST_TICK_WITHIN_S)
+    with pytest.raises(ProcessDiedError, match="base-station hangs"):
+        watchdog.check(12.0, 10.5, 10.0, 100.1 + FIRST_TICK_WITHIN_S)
+    watchdog.rest(200.0)
+    watchdog.check(12.0, 12.5, 12.1, 201.0)  # it ticks: as before
+    with pytest.raises(ProcessDiedError, match="hangs"):
+        watchdog.check(12.0, 12.5, 12.1, 201.1 + HANG_S)

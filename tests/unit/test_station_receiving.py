@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from base_station.receiving.fleet import LINK_LOST_WALL_S, Fleet
+from base_station.receiving.fleet import LINK_GIVEN_UP_WALL_S, LINK_LOST_WALL_S, Fleet
 from base_station.receiving.fleet_clock import FleetClock
 from base_station.receiving.telemetry import Sample, Track
 from base_station.station import Station
@@ -108,9 +108,13 @@ def test_a_vehicle_that_falls_silent_is_named_and_the_fleet_holds(rescue_view: S
     for k in range(1, 11):
         assert hear((0, 2), LINK_LOST_WALL_S * k / 10) == []
     texts = hear((0, 2), LINK_LOST_WALL_S + 0.1)
-    assert texts[0] == "no word from rover_2 for 5 s"
+    assert texts == ["no word from rover_2 for 5 s"]
+    assert not station.desk.ended  # it is waited for
+    for wall_s in np.arange(LINK_LOST_WALL_S + 0.5, LINK_GIVEN_UP_WALL_S, 0.5):
+        assert hear((0, 2), float(wall_s)) == []
+    assert "holding: a link is lost" in hear((0, 2), LINK_GIVEN_UP_WALL_S + 0.1)
     assert station.desk.ended
-    assert hear((0, 2), LINK_LOST_WALL_S + 1.0) == []
+    assert hear((0, 2), LINK_GIVEN_UP_WALL_S + 1.0) == []
 
 
 def test_silence_does_not_count_while_the_station_itself_is_not_running(
