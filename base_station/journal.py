@@ -11,6 +11,9 @@ own, and one that was killed leaves at worst a torn last record, at which readin
 A record is handed to the kernel before the step that it is about is carried out: the death of the
 process loses nothing. A thread asks for the disk once a second (fdatasync), so that the death of
 the machine loses about one second, and no step ever waits for a disk.
+
+A station that only waits for its vehicles knows nothing worth keeping: when its journal has become
+long, both begin anew.
 """
 
 import json
@@ -19,7 +22,7 @@ import struct
 import threading
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +31,7 @@ from base_station.records import Event
 from hil.errors import InputError
 
 SYNC_S = 1.0
+LONG_BYTES = 64_000_000
 FORMAT = 1
 MAX_RECORD = 1 << 26  # a longer one is not ours
 _RECORD = struct.Struct("<IIB")
@@ -151,11 +155,10 @@ def read_journal(folder: Path) -> Iterator[Record]:
 class Journal:
     """Appends records to a new file of a folder. Every method raises OSError, as on a full disk."""
 
-    def __init__(self, folder: Path, head: Head) -> None:
-        files = journal_files(folder)
-        last = int(files[-1].stem.rpartition("-")[2]) if files else 0
-        self.path = folder / f"journal-{last + 1:04d}.bin"
-        self._file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o600)
+    def __init__(self, folder: Path, head: Head, long_bytes: int = LONG_BYTES) -> None:
+        self._folder, self._head, self._long_bytes = folder, head, long_bytes
+        self._bytes = 0
+        self._file = self._new_file()
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._sync, daemon=True, name="journal")
         self.write(head)
@@ -164,6 +167,7 @@ class Journal:
     def write(self, *records: Record) -> None:
         """In one piece, so that a full disk tears at most the last."""
         data = b"".join(map(encoded, records))
+        self._bytes += len(data)
         while data:
             data = data[os.write(self._file, data) :]
 
@@ -176,6 +180,27 @@ class Journal:
         said = [Said(event_tree(event)) for event in events]
         if sent or said:
             self.write(Sent(sent), *said)
+
+    @property
+    def is_long(self) -> bool:
+        """Whether one that only waits should begin anew."""
+        return self._bytes >= self._long_bytes
+
+    def begin_anew(self) -> None:
+        """Forget all that was written: what comes from here on is a fresh station's."""
+        old, fresh = journal_files(self._folder), self._new_file()
+        os.dup2(fresh, self._file)  # under the thread's hands
+        os.close(fresh)
+        self._bytes = 0
+        self.write(replace(self._head, resumed=False))
+        for path in old:
+            path.unlink()
+
+    def _new_file(self) -> int:
+        files = journal_files(self._folder)
+        last = int(files[-1].stem.rpartition("-")[2]) if files else 0
+        self.path = self._folder / f"journal-{last + 1:04d}.bin"
+        return os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o600)
 
     def close(self) -> None:
         """Everything is on the disk afterwards, if it takes it. May be called twice."""

@@ -13,6 +13,7 @@ from base_station.field.safety import disarm_all, stop_all
 from base_station.journal import Datagrams, Inputs
 from base_station.listening import Listener, Listeners
 from base_station.outcome import PhaseTimes, outcome, training
+from base_station.phases import Connecting
 from base_station.planning.requests import PlanProgress, PlanReady, PlanRequest
 from base_station.records import Event
 from base_station.refusals import Refusals
@@ -45,7 +46,14 @@ class Planner(Protocol):
 
 
 class Keeper(Protocol):
-    """A journal. Both methods may raise OSError."""
+    """A journal. Its methods may raise OSError."""
+
+    @property
+    def is_long(self) -> bool:
+        """Whether one that only waits should begin anew."""
+
+    def begin_anew(self) -> None:
+        """What comes from here on is a fresh station's."""
 
     def inputs(self, inputs: Inputs) -> None:
         """Before a step."""
@@ -87,6 +95,7 @@ class StationNode:
         self._epoch_us = epoch_us
         datagrams, heard = self._receive()
         inputs = Inputs(wall_s, epoch_us, datagrams, self._answers())
+        self._keep(self._forget_the_wait)
         self._keep(lambda journal: journal.inputs(inputs))
         out = self._advance(inputs, heard)
         sent = tuple(self._encoded(out))
@@ -229,6 +238,11 @@ class StationNode:
         except OSError as error:
             self._journal = None
             self._listeners.fail("the journal", error)
+
+    def _forget_the_wait(self, journal: Keeper) -> None:
+        if journal.is_long and isinstance(self.station.desk.phase, Connecting):
+            journal.begin_anew()
+            self.station = Station(self.station.desk.view)
 
     def _log(self, index: int, datagram: bytes) -> None:
         self._listeners.datagram(index, self._epoch_us, datagram)

@@ -21,6 +21,8 @@ FULL = Path("/dev/full")
 class FullAfter:
     """A journal whose disk fills up."""
 
+    is_long = False
+
     def __init__(self, steps: int) -> None:
         self._left = steps
 
@@ -30,6 +32,8 @@ class FullAfter:
             raise OSError(errno.ENOSPC, "No space left on device")
 
     def outputs(self, sent: object, events: Sequence[Event]) -> None: ...
+
+    def begin_anew(self) -> None: ...
 
 
 def test_a_journal_that_cannot_be_written_ends_in_a_hold() -> None:

@@ -137,6 +137,28 @@ def test_the_journal_of_a_resumed_station_can_be_resumed_to_the_same(tmp_path: P
     assert steps[-1].wall_s == pytest.approx(20.0, abs=0.1)
 
 
+def test_a_station_that_waits_for_long_keeps_a_short_journal_and_then_does_its_work(
+    tmp_path: Path,
+) -> None:
+    late = '[{"from_s": 0, "until_s": 15, "loss": 1.0}]'
+    scenario = load_scenario(SCENARIOS / "rescue.yaml", [f"fleet.2.radio={late}"])
+    view = blind_view(scenario)
+    journal = Journal(tmp_path, Head(view.model_dump(mode="json")), long_bytes=20_000)
+    rig, _, times = start(scenario, scripted(0.8), journal)
+    until(times, 14.9)
+    (file,) = journal_files(tmp_path)
+    assert file.name == "journal-0003.bin"
+    assert file.stat().st_size < 25_000
+    assert resume(tmp_path, None).node.station.desk.phase.name == "connect"
+    run_until_ended(rig, times)
+    ours = rig.node.station.desk
+    assert ours.verdict is not None
+    assert ours.verdict.hypothesis == RIGHT["rescue"]
+    theirs = resume(tmp_path, None).node.station.desk
+    assert theirs.verdict == ours.verdict
+    np.testing.assert_array_equal(theirs.watch.state, ours.watch.state)
+
+
 @pytest.mark.parametrize("name", ["healthy", "rescue"])
 def test_a_starved_station_commands_nothing_stale_and_takes_nothing_for_a_fault(name: str) -> None:
     rig, heard, times = start(scenario_of(name), scripted(0.8))

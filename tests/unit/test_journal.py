@@ -18,6 +18,7 @@ from base_station.journal import (
     Sent,
     decoded,
     encoded,
+    journal_files,
     read_journal,
 )
 from base_station.planning.requests import PlanReady, PolicyWeights, Training
@@ -98,3 +99,19 @@ def test_no_journal_and_one_of_another_version(tmp_path: Path) -> None:
         list(read_journal(tmp_path))
     (tmp_path / "journal-0001.bin").write_bytes(b"")
     assert list(read_journal(tmp_path)) == []
+
+
+def test_a_journal_that_begins_anew_holds_what_came_after_and_nothing_else(tmp_path: Path) -> None:
+    journal = Journal(tmp_path, HEAD, long_bytes=1000)
+    steps = [Inputs(float(k), k, ((0, bytes(100)),)) for k in range(20)]
+    for step in steps[:10]:
+        assert not journal.is_long or step.epoch_us >= 7
+        journal.inputs(step)
+    assert journal.is_long
+    journal.begin_anew()
+    assert not journal.is_long
+    for step in steps[10:]:
+        journal.inputs(step)
+    journal.close()
+    assert list(read_journal(tmp_path)) == [replace(HEAD, resumed=False), *steps[10:]]
+    assert [path.name for path in journal_files(tmp_path)] == ["journal-0002.bin"]
