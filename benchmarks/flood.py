@@ -63,7 +63,7 @@ ROLES = {
 }
 BEGIN_S = 3.0  # world time: everybody is there
 CALM_S = 5.0  # wall time before the flood, in which CPU is measured
-BURST_S, MAKE_UP_S = 0.02, 0.5  # a sender that the machine held up makes up for so much
+BURST_S, MAKE_UP_S = 0.02, 0.1  # a sender that was held up makes up for so much and no more
 STRANGERS = 3
 OWN_SUSPECT = "rover_2"  # who is broken in the scenarios
 
