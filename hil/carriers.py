@@ -10,7 +10,7 @@ import serial
 
 from hil.connection import Connection
 from hil.errors import InputError
-from hil.link import Address
+from hil.link import Address, make_room
 from hil.mavlink.stream import Frame, FrameCutter, frames_of
 
 RECONNECT_S = 1.0
@@ -35,7 +35,7 @@ class UdpCarrier:
     it is told whom: that somebody has sent a datagram does not make a vehicle of him."""
 
     def __init__(self, sock: socket.socket, given: Address | None) -> None:
-        sock.setblocking(False)
+        make_room(sock)
         self._socket, self._given = sock, given
 
     def fileno(self) -> int:

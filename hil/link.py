@@ -13,6 +13,13 @@ MAX_GUESTS = 4
 GUEST_FORGOTTEN_S = 30.0
 PEER_FORGOTTEN_S = 2.0
 LOCALHOST = "127.0.0.1"
+RECEIVE_BYTES = 1 << 20  # strangers may not crowd out who belongs here
+
+
+def make_room(sock: socket.socket) -> None:
+    """Never wait for this socket, and let much wait in it: as much as the system grants."""
+    sock.setblocking(False)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BYTES)
 
 
 def is_here(host: str) -> bool:
@@ -73,7 +80,7 @@ class UdpLink:
         peer: Address | None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
-        sock.setblocking(False)
+        make_room(sock)
         self._socket, self._peer, self._now = sock, peer, now
         self._given = peer is not None
         self._heard_s = -float("inf")
@@ -153,7 +160,7 @@ class UdpHub:
         is_welcome: Callable[[bytes], bool],
         now: Callable[[], float] = time.monotonic,
     ) -> None:
-        sock.setblocking(False)
+        make_room(sock)
         self._socket, self._is_welcome, self._now = sock, is_welcome, now
         self._numbers: dict[Address, int] = {host: 0}
         self._heard_s: dict[Address, float] = {}  # guests alone
