@@ -113,7 +113,15 @@ def _reproduce(options: argparse.Namespace) -> int:
     studies = tuple(study for study in STUDIES if study in (options.studies or STUDIES))
     base = blind_view(load_scenario(options.scenario))
     print(
-        reproduce(base, options.out, studies, options.trainings, options.restarts, options.minutes)
+        reproduce(
+            base,
+            options.out,
+            studies,
+            options.trainings,
+            options.restarts,
+            options.minutes,
+            tuple(options.only),
+        )
     )
     return 0
 
@@ -258,8 +266,15 @@ def _parser() -> argparse.ArgumentParser:
     reproduce.add_argument(
         "--studies",
         nargs="+",
-        choices=["paper", "objective", "ladder", "ablation", "cost"],
+        choices=["paper", "layouts", "objective", "ladder", "ablation", "cost"],
         help="default: all of them",
+    )
+    reproduce.add_argument(
+        "--only",
+        nargs="+",
+        default=["*"],
+        metavar="PATTERN",
+        help="jobs whose key STUDY/CASE/PLANNER/PRESET/NUMBER/CHANGE matches, with * for anything",
     )
     reproduce.add_argument(
         "--restarts", type=times, default=20, metavar="N", help="when a target is missed"

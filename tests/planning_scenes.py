@@ -5,7 +5,8 @@ import numpy as np
 from base_station.belief.hypotheses import candidates, nominal
 from base_station.planning.requests import PlanRequest
 from base_station.twin import initial_state
-from hil.scenario import StationView
+from hil.scenario import Obstacle, StationView
+from hil.scenario.places import Point
 
 NEAR_M = 2.5
 
@@ -29,3 +30,12 @@ def experiment(view: StationView, **changes) -> PlanRequest:
 def planning(view: StationView, **changes) -> StationView:
     """The view with other keys in `planning`."""
     return view.model_copy(update={"planning": view.planning.model_copy(update=changes)})
+
+
+def walled(view: StationView, *strokes: tuple[float, float, float, float, float]) -> StationView:
+    """The view with obstacles: from and to (north, east), radius (m)."""
+    obstacles = tuple(
+        Obstacle(at=Point(north_m=a, east_m=b), to=Point(north_m=c, east_m=d), radius_m=radius)
+        for a, b, c, d, radius in strokes
+    )
+    return view.model_copy(update={"obstacles": obstacles})

@@ -74,6 +74,6 @@ def test_the_scripted_push_is_a_judge_of_what_is_feasible(rescue_view, tier):
         found = layout(rescue_view, tier, "tuning", number)
         problem = beta_problem(found.view, mission(found, 0))
         rng = np.random.default_rng(3)
-        home = brought_home(problem, lambda s, d, _, p=problem: push(p, s, d), rng, 4)
+        home = brought_home(problem, push(problem), rng, 4)
         if (tier, number) != ("obstructed", 5):
             assert home.mean() >= 0.75, number

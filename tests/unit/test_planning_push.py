@@ -14,7 +14,7 @@ from base_station.twin import initial_state
 
 def home(problem, n=32) -> float:
     rng = np.random.default_rng(3)
-    return float(brought_home(problem, lambda s, d, _: push(problem, s, d), rng, n).mean())
+    return float(brought_home(problem, push(problem), rng, n).mean())
 
 
 @pytest.mark.parametrize("fault", ["motor_y_off", "motor_x_off"])
@@ -40,8 +40,8 @@ def test_in_no_time_nothing_is_feasible(rescue_view):
 
 def test_only_who_is_commanded_moves_and_none_too_fast(rescue_view):
     problem = beta_problem(rescue_view, asked(rescue_view, "beta", "motor_y_off"))
-    states = problem.start[None]
-    actions = push(problem, states, np.zeros((1, 3), dtype=np.bool_))
+    states, play = problem.start[None], push(problem)
+    actions = play(states, np.zeros((1, 3), dtype=np.bool_), 0)
     assert actions.shape == (1, problem.commands.size)
     assert np.linalg.norm(actions.reshape(3, 2), axis=1).max() <= 1.0 + 1e-12
-    assert not push(problem, states, np.ones((1, 3), dtype=np.bool_)).any()
+    assert not play(states, np.ones((1, 3), dtype=np.bool_), 0).any()

@@ -4,17 +4,15 @@ from dataclasses import replace
 
 from base_station.planning.tasks.alpha import AlphaProblem
 from base_station.planning.tasks.beta import BetaProblem
-from base_station.twin import DECLARED, Uncertainty
-from hil.scenario import StationView
+from hil.scenario import StationView, Uncertainty
 
-EXACT = Uncertainty(0.0, 0.0, 0.0, 0.0, 0.0)
-TWICE = Uncertainty(
-    2.0 * DECLARED.motor_gain_sigma,
-    2.0 * DECLARED.mass_sigma,
-    2.0 * DECLARED.rolling_sigma,
-    2.0 * DECLARED.friction_max,
-    DECLARED.latency_max_s,
+EXACT = Uncertainty(
+    motor_gain_sigma=0.0, mass_sigma=0.0, rolling_sigma=0.0, friction_max=0.0, latency_max_s=0.0
 )
+TWICE = Uncertainty(
+    motor_gain_sigma=0.06, mass_sigma=0.04, rolling_sigma=0.2, friction_max=0.6, latency_max_s=0.1
+)
+UNSURE = {"twin exact": EXACT, "twin twice as unsure": TWICE}
 
 
 def changed_view(view: StationView, change: str) -> StationView:
@@ -30,10 +28,8 @@ def changed_view(view: StationView, change: str) -> StationView:
 
 def changed_problem(problem: AlphaProblem, change: str) -> AlphaProblem:
     """The experiment as it is learned; it is judged as it was."""
-    if change == "twin exact":
-        return replace(problem, declared=EXACT)
-    if change == "twin twice as unsure":
-        return replace(problem, declared=TWICE)
+    if change in UNSURE:
+        return replace(problem, declared=UNSURE[change])
     if change == "starts exact":
         return replace(problem, start_sigma_m=0.0)
     if change == "starts twice as spread":

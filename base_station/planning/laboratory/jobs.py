@@ -2,13 +2,14 @@
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from fnmatch import fnmatchcase
 from typing import Literal
 
 from base_station.planning.laboratory.layouts import TIERS
 
-Study = Literal["paper", "ladder", "ablation", "objective", "cost"]
+Study = Literal["paper", "layouts", "objective", "ladder", "ablation", "cost"]
 
-STUDIES: tuple[Study, ...] = ("paper", "objective", "ladder", "ablation", "cost")
+STUDIES: tuple[Study, ...] = ("paper", "layouts", "objective", "ladder", "ablation", "cost")
 LEARNERS = ("ppo", "ppo_lstm", "qtable", "dqn")
 SEARCHES = ("cem", "shooting", "random", "gradient", "ram")
 ABLATIONS = (
@@ -43,12 +44,11 @@ class Job:
         return "/".join(str(value) for value in asdict(self).values())
 
 
-def jobs(studies: tuple[Study, ...], trainings: int) -> Iterator[Job]:
-    """All jobs of the studies; first those with the first number, so that every table fills up
-    evenly and can be looked at early."""
-    for number in range(trainings):
-        for study in studies:
-            yield from _numbered(study, number)
+def jobs(studies: tuple[Study, ...], trainings: int, only: tuple[str, ...] = ("*",)) -> list[Job]:
+    """The jobs of the studies whose key matches one of the patterns in `only`; first those with the
+    first number, so that every table fills up evenly and can be looked at early."""
+    every = (job for n in range(trainings) for study in studies for job in _numbered(study, n))
+    return [job for job in every if any(fnmatchcase(job.key, pattern) for pattern in only)]
 
 
 def _numbered(study: Study, number: int) -> Iterator[Job]:
@@ -58,6 +58,9 @@ def _numbered(study: Study, number: int) -> Iterator[Job]:
                 for planner in ("ppo", "ppo_lstm"):
                     yield Job(study, case, planner, preset, number)
             yield Job(study, "beta", "ppo", preset, number)
+    elif study == "layouts":
+        tier = TIERS[number % len(TIERS)]
+        yield Job(study, tier, "ppo", "tuned", number // len(TIERS))
     elif study == "objective":
         for case in ("near", "far"):
             for objective in ("paper_distance", "information"):
@@ -66,8 +69,6 @@ def _numbered(study: Study, number: int) -> Iterator[Job]:
     elif study == "ladder":
         for tier in TIERS:
             for planner in (*LEARNERS, *SEARCHES):
-                yield Job(study, tier, planner, "tuned", number)
-            for planner in ("ppo_mission", "push"):
                 yield Job(study, tier, planner, "tuned", number)
     elif study == "ablation":
         for change in ABLATIONS:

@@ -1,6 +1,7 @@
 """One job of a reproduction: done, and what came out as a row of plain numbers."""
 
 import time
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -12,21 +13,21 @@ from base_station.planning.attempts import derived_seed
 from base_station.planning.laboratory import layouts
 from base_station.planning.laboratory.changes import changed_mission, changed_problem, changed_view
 from base_station.planning.laboratory.jobs import Job
-from base_station.planning.laboratory.layouts import Layout, layout
+from base_station.planning.laboratory.layouts import layout
 from base_station.planning.learning.lesson import Lesson
+from base_station.planning.learning.presets import Preset
 from base_station.planning.policy import to_setpoints
 from base_station.planning.problems import alpha_problem, beta_problem
 from base_station.planning.requests import OpenLoopPlan, PlanRequest
 from base_station.planning.scripted.push import push
 from base_station.planning.searches.search import search
 from base_station.planning.tasks.alpha import AlphaProblem, AlphaTask, nominal_returns, played
-from base_station.planning.tasks.beta import brought_home
+from base_station.planning.tasks.beta import BetaProblem, brought_home
 from base_station.planning.tasks.candidates import open_loop_plan
 from base_station.planning.tasks.evaluation import plan_errors, predict
 from base_station.planning.trying import (
     LEARNERS,
     SEARCHES,
-    SUCCESS_SHARE,
     preset_of,
     taught,
     taught_mission,
@@ -41,6 +42,7 @@ APART_M = {"near": 2.5, "far": 4.3, "beta": 2.5}
 SAMPLES = 16  # of a policy, when its best plan counts
 TIMED_STEPS = 1_000_000  # of one vehicle, for a timing
 FEASIBLE_ROLLOUTS = 16
+FEASIBLE_SHARE = 0.75  # of the script's perturbed rollouts
 
 
 def measure(base: StationView, job: Job, restarts: int) -> Row:
@@ -52,6 +54,8 @@ def measure(base: StationView, job: Job, restarts: int) -> Row:
         row = _objective(base, job)
     elif job.study == "ladder":
         row = _ladder(base, job)
+    elif job.study == "layouts":
+        row = _rescue(base, job, restarts)
     elif job.case == "beta":
         row = _mission(base, job, restarts)
     else:
@@ -83,53 +87,64 @@ def _training(base: StationView, job: Job, restarts: int) -> Row:
     view = changed_view(base, job.change)
     request = row_of_three(view, job)
     problem = changed_problem(alpha_problem(view, request), job.change)
-    judge, attempts = alpha_problem(base, request), []
-    for k in range(restarts + 1):
-        seed = derived_seed(job.number, k)
-        learn, preset = LEARNERS[job.planner], preset_of(request)
-        done, found = taught(learn, view, problem, preset, seed, lambda *_: None)
-        rng = np.random.default_rng([seed, 3])
-        actions = played(problem, done.actor, 2, rng)
-        setpoints = to_setpoints(actions, problem.commands)
-        errors = [_error(judge if _alike(judge, problem) else problem, s) for s in setpoints]
-        distance = [_distance(problem, s) for s in setpoints]
-        attempts.append(
-            {
-                "accepted": done.accepted,
-                "timesteps": done.timesteps,
-                "took_s": done.wall_s,
-                "error": found.error,
-                "mode": {"error": errors[0], **distance[0]},
-                "sample": {"error": errors[1], **distance[1]},
-                "curve": done.curve,
-            }
+    judge, preset = alpha_problem(base, request), preset_of(request)
+    judge = judge if _alike(judge, problem) else problem
+
+    def attempt(seed: int) -> Row:
+        began_s = time.process_time()
+        done, found = taught(LEARNERS[job.planner], view, problem, preset, seed, lambda *_: None)
+        took_s = time.process_time() - began_s
+        actions = played(problem, done.actor, 2, np.random.default_rng([seed, 3]))
+        mode, sample = (
+            _outcome(judge, problem, s) for s in to_setpoints(actions, problem.commands)
         )
-        if done.accepted:
-            break
-    return {"attempts": attempts}
+        told = {"error": found.error, "mode": mode, "sample": sample, "curve": done.curve}
+        return {
+            "accepted": done.accepted,
+            "timesteps": done.timesteps,
+            "cpu_s": took_s,
+            **told,
+        }
+
+    return _until_accepted(attempt, job.number, restarts)
 
 
 def _alike(one: AlphaProblem, other: AlphaProblem) -> bool:
     return one.steps == other.steps and one.commands == other.commands
 
 
+def _outcome(judge: AlphaProblem, problem: AlphaProblem, setpoints: Array) -> Row:
+    return {"error": _error(judge, setpoints), **_distance(problem, setpoints)}
+
+
 def _mission(base: StationView, job: Job, restarts: int) -> Row:
-    request, attempts = row_of_three(base, job), []
+    request = row_of_three(base, job)
     problem = changed_mission(beta_problem(base, request), job.change)
-    for k in range(restarts + 1):
-        seed = derived_seed(job.number, k)
-        done = taught_mission(problem, preset_of(request), seed, lambda *_: None)
-        attempts.append(
-            {
-                "accepted": done.accepted,
-                "timesteps": done.timesteps,
-                "took_s": done.wall_s,
-                "curve": done.curve,
-            }
-        )
-        if done.accepted:
-            break
-    return {"attempts": attempts}
+    return _missions(problem, preset_of(request), job.number, restarts)
+
+
+def _missions(problem: BetaProblem, preset: Preset, seed: int, restarts: int) -> Row:
+    """Trainings of a mission until one is accepted."""
+
+    def attempt(seed: int) -> Row:
+        began_s = time.process_time()
+        done = taught_mission(problem, preset, seed, lambda *_: None)
+        return {
+            "accepted": done.accepted,
+            "timesteps": done.timesteps,
+            "cpu_s": time.process_time() - began_s,
+            "curve": done.curve,
+        }
+
+    return _until_accepted(attempt, seed, restarts)
+
+
+def _until_accepted(attempt: Callable[[int], Row], seed: int, restarts: int) -> Row:
+    """Attempts with the seeds that the planner would give them."""
+    done: list[Row] = []
+    while len(done) <= restarts and not (done and done[-1]["accepted"]):
+        done.append(attempt(derived_seed(seed, len(done))))
+    return {"attempts": done}
 
 
 def _error(problem: AlphaProblem, setpoints: Array) -> float:
@@ -196,8 +211,6 @@ def _best_found(problem: AlphaProblem, job: Job, budget: int) -> float:
 def _ladder(base: StationView, job: Job) -> Row:
     """A planner on a random layout of the test set, at the same budget as all others."""
     found = layout(base, job.case, "test", job.number)  # type: ignore[arg-type]
-    if job.planner in ("push", "ppo_mission"):
-        return _ladder_mission(found, job)
     request = layouts.experiment(found, job.number)
     problem, preset = alpha_problem(found.view, request), preset_of(request)
     target = found.view.diagnosis.plan_error
@@ -231,17 +244,17 @@ def _worth(plan: OpenLoopPlan) -> Row:
     }
 
 
-def _ladder_mission(found: Layout, job: Job) -> Row:
-    request = layouts.mission(found, job.number)
-    problem = beta_problem(found.view, request)
-    if job.planner == "push":
-        rng = np.random.default_rng([job.number, 1])
-        home = brought_home(
-            problem, lambda states, done, _: push(problem, states, done), rng, FEASIBLE_ROLLOUTS
-        )
-        return {"accepted": bool(home.mean() >= SUCCESS_SHARE), "share": float(home.mean())}
-    done = taught_mission(problem, preset_of(request), job.number, lambda *_: None)
-    return {"accepted": done.accepted, "timesteps": done.timesteps}
+def _rescue(base: StationView, job: Job, restarts: int) -> Row:
+    """A mission on a random layout of the test set, if it is feasible: if the script can do it."""
+    found = layout(base, job.case, "test", job.number)  # type: ignore[arg-type]
+    request = layouts.mission(found, job.number, job.preset)
+    problem, rng = beta_problem(found.view, request), np.random.default_rng([job.number, 1])
+    home = brought_home(problem, push(problem), rng, FEASIBLE_ROLLOUTS)
+    scripted = float(home.mean())
+    if scripted < FEASIBLE_SHARE:
+        return {"scripted": scripted, "attempts": []}
+    learned = _missions(problem, preset_of(request), job.number, restarts)
+    return {"scripted": scripted, **learned}
 
 
 def _cost(base: StationView, count: int) -> Row:

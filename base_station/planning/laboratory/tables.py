@@ -47,7 +47,17 @@ def groups(rows: Mapping[str, Row], study: str) -> dict[tuple[str, ...], list[Ro
 
 def report(rows: Mapping[str, Row]) -> str:
     """All tables that there are results for."""
-    parts = (_paper, _thresholds, _by_vehicle, _objective, _ladder, _ablation, _cost)
+    parts = (
+        _paper,
+        _together,
+        _layouts,
+        _thresholds,
+        _by_vehicle,
+        _objective,
+        _ladder,
+        _ablation,
+        _cost,
+    )
     return "\n".join(text for part in parts if (text := part(rows)))
 
 
@@ -65,7 +75,7 @@ def _paper(rows: Mapping[str, Row]) -> str:
     for (case, planner, preset, _), found in groups(rows, "paper").items():
         first = [row["attempts"][0] for row in found]
         lasts = [row["attempts"][-1] for row in found]
-        took = [attempt["took_s"] for attempt in first]
+        took = [attempt["cpu_s"] for attempt in first]
         played = [
             counted([attempt[how]["error"] <= TARGET for attempt in first])
             if case != "beta"
@@ -83,8 +93,60 @@ def _paper(rows: Mapping[str, Row]) -> str:
             ]
         )
     head = ["case, planner, preset", "without restarts", "with", "one sampled trajectory", "mode"]
-    text = table("Trainings", [*head, "s, median (largest)", "steps, median"], lines)
+    text = table("Trainings", [*head, "CPU s, median (largest)", "steps, median"], lines)
     return text and text + CONTEXT
+
+
+def _together(rows: Mapping[str, Row]) -> str:
+    """An experiment and a mission with the same number, all their attempts: one processor."""
+    lines = []
+    for case in ("near", "far"):
+        parts = [_costs(rows, Job("paper", c, "ppo", "tuned", 0)) for c in (case, "beta")]
+        both = [parts[0][n] + parts[1][n] for n in parts[0].keys() & parts[1].keys()]
+        if both:
+            spent = f"{statistics.median(both):.1f} ({max(both):.1f})"
+            lines.append([f"{case} + beta, ppo, tuned", str(len(both)), spent])
+    head = ["both plans, restarts included", "pairs", "CPU s, median (largest)"]
+    return table("Both learned together", head, lines)
+
+
+def _costs(rows: Mapping[str, Row], like: Job) -> dict[str, float]:
+    """CPU time (s) of all attempts by the number of the job."""
+    spent = {}
+    for key, row in rows.items():
+        study, case, planner, preset, number, change = key.split("/")
+        if (study, case, planner, preset, change) == (
+            like.study,
+            like.case,
+            like.planner,
+            like.preset,
+            like.change,
+        ):
+            spent[number] = sum(attempt["cpu_s"] for attempt in row["attempts"])
+    return spent
+
+
+def _layouts(rows: Mapping[str, Row]) -> str:
+    found = groups(rows, "layouts")
+    lines = [_of_layouts(tier, some) for (tier, *_), some in found.items()]
+    if len(found) > 1:
+        lines.append(_of_layouts("all", [row for some in found.values() for row in some]))
+    head = ["tier", "feasible", "without restarts", "with", "CPU s, median (largest)"]
+    return table("Missions on random layouts of the test set", head, lines)
+
+
+def _of_layouts(tier: str, some: Sequence[Row]) -> list[str]:
+    tried = [row["attempts"] for row in some if row["attempts"]]
+    if not tried:
+        return [tier, f"0 of {len(some)}", "-", "-", "-"]
+    took = [attempts[0]["cpu_s"] for attempts in tried]
+    return [
+        tier,
+        f"{len(tried)} of {len(some)}",
+        counted([attempts[0]["accepted"] for attempts in tried]),
+        counted([attempts[-1]["accepted"] for attempts in tried]),
+        f"{statistics.median(took):.1f} ({max(took):.1f})",
+    ]
 
 
 def _thresholds(rows: Mapping[str, Row]) -> str:

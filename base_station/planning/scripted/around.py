@@ -8,14 +8,13 @@ Flags = NDArray[np.bool_]
 
 GAP_M = 0.25  # between the discs on the way round
 LATERAL_M = 0.08  # how well aligned it must be to push
-GAIN = 1.5  # m/s per m
 
 
 def get_behind(
     position_m: Array, centre_m: Array, direction: Array, reach_m: float
 ) -> tuple[Array, Flags]:
-    """A velocity [N, 2] (m/s) that brings discs at `position_m` [N, 2] round those at `centre_m`
-    to push along unit vectors `direction` [N, 2]; and whether they are there [N].
+    """Where [N, 2] discs at `position_m` [N, 2] must drive to get round those at `centre_m` and
+    push along unit vectors `direction` [N, 2]; and whether they are there [N].
 
     `reach_m` is the sum of the radii.
     """
@@ -34,4 +33,4 @@ def get_behind(
     goal = np.where(passing | (far_side & (np.abs(across) > reach_m)), corner, goal)
     aligned = np.abs(across) <= LATERAL_M
     ready: Flags = (~far_side & aligned)[:, 0]
-    return GAIN * (goal - position_m), ready
+    return goal, ready

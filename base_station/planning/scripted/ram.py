@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from base_station.planning.policy import to_setpoints
 from base_station.planning.scripted.around import get_behind
+from base_station.planning.scripted.roads import Roads
 from base_station.planning.searches.search import Proposals
 from base_station.planning.tasks.alpha import AlphaProblem
 from base_station.twin import EAST, NORTH
@@ -16,6 +17,7 @@ Array = NDArray[np.float64]
 DIRECTIONS = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 PUSHES_S = (1.0, 2.0, 3.0)
 TOUCH_M = 0.1
+GAIN = 1.5  # m/s per m
 
 
 def ram(problem: AlphaProblem, rng: np.random.Generator) -> Proposals:  # noqa: ARG001
@@ -29,18 +31,25 @@ def _script(
     problem: AlphaProblem, helper: int, direction: tuple[float, float], push_s: float
 ) -> Array:
     """Actions [K, A]: the drive of one helper in the nominal twin, as it went."""
-    commands, radius = problem.commands, problem.model.vehicles.radius_m
+    commands, vehicles = problem.commands, problem.model.vehicles
+    radius = vehicles.radius_m
     slot = commands.size // len(commands.commanded) * commands.commanded.index(helper)
     states = problem.start[None].copy()
     memory = problem.objective.begin(problem.reports(states))
     actions = np.zeros((problem.steps, commands.size))
+    low, high = (
+        vehicles.bounds_m[[0, 2]] + radius[helper],
+        vehicles.bounds_m[[1, 3]] - radius[helper],
+    )
+    roads = Roads.of(vehicles.obstacles_m, float(radius[helper]), low, high)
     reach = float(radius[helper] + radius[problem.suspect])
     left = pushes = round(push_s / problem.period_s)
     way = np.array([direction])
     for k in range(problem.steps):
         position = states[:, 0, :, NORTH : EAST + 1]
         here, there = position[:, helper], position[:, problem.suspect]
-        velocity, ready = get_behind(here, there, way, reach)
+        place, ready = get_behind(here, there, way, reach)
+        velocity = GAIN * (roads.towards(here, place) - here)
         touches = np.linalg.norm(here - there) <= reach + TOUCH_M
         if left < pushes or (ready[0] and touches):
             velocity, left = way * (left > 0), left - 1
