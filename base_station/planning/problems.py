@@ -31,6 +31,7 @@ def alpha_problem(view: StationView, request: PlanRequest) -> AlphaProblem:
         steps=round(view.planning.alpha_horizon_s * view.clock.control_hz),
         limits=Limits.of_view(view, suspect),
         objective=objective_of(view.planning.objective, request.posterior),
+        declared=view.uncertainty,
         weights=tuple(p / sum(request.posterior) for p in request.posterior),
     )
 

@@ -5,11 +5,9 @@ are environments x hypotheses with the hypothesis running fastest.
 """
 
 from base_station.twin.model import (
-    DECLARED,
     FaultArrays,
     FleetModel,
     Parameters,
-    Uncertainty,
     Vehicles,
     fault_rows,
     perturbed,
@@ -35,7 +33,6 @@ from base_station.twin.state import (
 from base_station.twin.step import Advanced, advance, advance_in_place, report
 
 __all__ = [
-    "DECLARED",
     "DRIVEN",
     "EAST",
     "HELD_EAST",
@@ -55,7 +52,6 @@ __all__ = [
     "FaultArrays",
     "FleetModel",
     "Parameters",
-    "Uncertainty",
     "Vehicles",
     "advance",
     "advance_in_place",

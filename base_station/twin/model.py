@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from base_station.belief.hypotheses import Hypothesis
 from hil.airframe import Airframe, Motor
 from hil.faults import NED_AXES, Type, Unit
-from hil.scenario import Obstacle, Rectangle, StationView
+from hil.scenario import Obstacle, Rectangle, StationView, Uncertainty
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+AS_ASSUMED = Uncertainty()
 CONTACT_FRICTION = 0.1  # nominal, between two vehicles and between vehicle and wall
 
 
@@ -62,20 +63,6 @@ class FaultArrays(NamedTuple):
     gps_stuck: Array  # [H, V, 2] 1: the NED axis (north, east) is frozen
 
 
-@dataclass(frozen=True)
-class Uncertainty:
-    """Declared ranges: sigma of a factor around 1, or upper end of a uniform draw from 0."""
-
-    motor_gain_sigma: float = 0.03
-    mass_sigma: float = 0.02
-    rolling_sigma: float = 0.10
-    friction_max: float = 0.3
-    latency_max_s: float = 0.1
-
-
-DECLARED = Uncertainty()
-
-
 @dataclass(frozen=True, eq=False)
 class FleetModel:
     """The nominal twin of a fleet, in the order of `view.fleet`."""
@@ -83,6 +70,7 @@ class FleetModel:
     sysids: tuple[int, ...]
     vehicles: Vehicles
     nominal: Parameters  # P = 1
+    declared: Uncertainty = AS_ASSUMED
 
     @classmethod
     def from_view(cls, view: StationView) -> Self:
@@ -125,7 +113,8 @@ class FleetModel:
             friction=np.array([CONTACT_FRICTION]),
             latency_s=np.zeros(1),
         )
-        return cls(tuple(member.sysid for member in view.fleet), vehicles, nominal)
+        sysids = tuple(member.sysid for member in view.fleet)
+        return cls(sysids, vehicles, nominal, view.uncertainty)
 
     def within(self, area: Rectangle) -> Self:
         """The same fleet with walls around `area`."""
@@ -145,24 +134,30 @@ class FleetModel:
 
 
 def perturbed(
-    model: FleetModel, rng: np.random.Generator, n: int, declared: Uncertainty = DECLARED
+    model: FleetModel, rng: np.random.Generator, n: int, declared: Uncertainty | None = None
 ) -> Parameters:
-    """`n` draws of the uncertain parameters (P = n)."""
+    """`n` draws of the uncertain parameters (P = n), from the ranges that the view declares."""
     nominal, v = model.nominal, model.size
+    declared = declared or model.declared
     mass = 1.0 + declared.mass_sigma * rng.standard_normal((n, v))
     rolling = mass * _positive(1.0 + declared.rolling_sigma * rng.standard_normal((n, v)))
     gain_shape = (n, *nominal.stall_force_n.shape[1:])
     gain = 1.0 + declared.motor_gain_sigma * rng.standard_normal(gain_shape)
+    friction = rng.uniform(0.0, declared.friction_max, n)
+    latency = rng.uniform(0.0, declared.latency_max_s, n)
+    speed = np.ones(gain_shape)
+    if declared.free_speed_sigma > 0.0:
+        speed = _positive(1.0 + declared.free_speed_sigma * rng.standard_normal(gain_shape))
     return Parameters(
         stall_force_n=nominal.stall_force_n * gain,
         mass_kg=nominal.mass_kg * mass,
         inertia_kgm2=nominal.inertia_kgm2 * mass,
-        free_speed_mps=np.repeat(nominal.free_speed_mps, n, axis=0),
+        free_speed_mps=nominal.free_speed_mps * speed,
         rolling_force_n=nominal.rolling_force_n * rolling,
         side_force_n=nominal.side_force_n * mass,
         yaw_resistance_nm=nominal.yaw_resistance_nm * rolling,
-        friction=rng.uniform(0.0, declared.friction_max, n),
-        latency_s=rng.uniform(0.0, declared.latency_max_s, n),
+        friction=friction,
+        latency_s=latency,
     )
 
 

@@ -34,7 +34,7 @@ from hil.scenario.places import (
 )
 from hil.scenario.schema import Scenario
 from hil.scenario.station import STATION_AIRFRAMES, FleetMember, Safety, StationView, station_view
-from hil.scenario.vehicles import Plant, Radio, Sensors, Vehicle
+from hil.scenario.vehicles import Plant, Radio, Sensors, Uncertainty, Vehicle
 
 __all__ = [
     "MAX_FILE_BYTES",
@@ -70,6 +70,7 @@ __all__ = [
     "Slope",
     "StationView",
     "Terrain",
+    "Uncertainty",
     "Vehicle",
     "Wind",
     "in_effect",

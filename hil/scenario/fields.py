@@ -31,6 +31,7 @@ def _speakable(text: str) -> str:
 ConnectionText = Annotated[str, AfterValidator(_speakable)]
 VehicleName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
 Share = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)]
+Spread = Annotated[float, Field(ge=0, le=0.3)]  # sigma of a factor around 1
 Seconds = Annotated[float, Field(ge=0, le=60)]
 
 

@@ -17,7 +17,7 @@ from hil.scenario.fields import (
 from hil.scenario.mission import Diagnosis, Limits, Planning
 from hil.scenario.places import Arena, Clock, OriginModel, Point
 from hil.scenario.station import FleetMember, Safety, StationView
-from hil.scenario.vehicles import Sensors
+from hil.scenario.vehicles import Sensors, Uncertainty
 
 
 class FleetVehicle(Model):
@@ -41,6 +41,7 @@ class FleetFile(Model):
     yaw: Literal["locked", "free"] = "free"
     clock: Clock = Clock(telemetry_hz=10)
     sensors: Sensors = Sensors()
+    uncertainty: Uncertainty = Uncertainty()
     diagnosis: Diagnosis = Diagnosis()
     planning: Planning = Planning()
     limits: Limits = Limits()

@@ -11,7 +11,7 @@ from hil.scenario.faults import FaultModel
 from hil.scenario.fields import MAX_PORT, PORTS_PER_VEHICLE, Model, Seed
 from hil.scenario.mission import Diagnosis, Expectation, Limits, Links, Planning
 from hil.scenario.places import Arena, Clock, Geofence, Obstacles, OriginModel, Terrain
-from hil.scenario.vehicles import Plant, Radios, Sensors, Vehicle
+from hil.scenario.vehicles import Plant, Radios, Sensors, Uncertainty, Vehicle
 
 
 class Scenario(Model):
@@ -26,6 +26,7 @@ class Scenario(Model):
     clock: Clock = Clock()
     fleet: Annotated[tuple[Vehicle, ...], Field(min_length=1, max_length=100)]
     sensors: Sensors = Sensors()
+    uncertainty: Uncertainty = Uncertainty()
     plant: Plant = Plant()
     terrain: Terrain = Terrain()
     radio: Annotated[Radios, Field(max_length=100)] = ()

@@ -26,7 +26,7 @@ from hil.scenario.fields import (
 from hil.scenario.mission import Diagnosis, Limits, Planning
 from hil.scenario.places import Arena, Clock, Geofence, Obstacles, OriginModel, Point
 from hil.scenario.schema import Scenario
-from hil.scenario.vehicles import Sensors
+from hil.scenario.vehicles import Sensors, Uncertainty
 
 STATION_AIRFRAMES = ("omni_plus", "skid_steer")  # those that the station's twin can be
 
@@ -81,6 +81,7 @@ class StationView(Model):
     clock: Clock
     fleet: Annotated[tuple[FleetMember, ...], Field(min_length=1, max_length=100)]
     sensors: Sensors
+    uncertainty: Uncertainty = Uncertainty()
     diagnosis: Diagnosis
     planning: Planning
     limits: Limits
@@ -151,6 +152,7 @@ def station_view(scenario: Scenario, mavlink_port_base: int, station_seed: int) 
         clock=scenario.clock,
         fleet=fleet,
         sensors=scenario.sensors,
+        uncertainty=scenario.uncertainty,
         diagnosis=scenario.diagnosis,
         planning=scenario.planning,
         limits=scenario.limits,

@@ -15,6 +15,7 @@ from hil.scenario.fields import (
     Positive,
     Seconds,
     Share,
+    Spread,
     SysId,
     VehicleName,
 )
@@ -72,6 +73,22 @@ class Sensors(Model):
     compass_sigma_rad: Positive = 0.01
     accel_sigma_mps2: Positive = 0.05
     level_sigma_rad: Positive = 0.002
+
+
+class Uncertainty(Model):
+    """How far the station takes vehicles to be from their data sheets: ranges of its twins' draws.
+
+    Each sigma is of a factor around 1: stall force and free speed of every motor, mass (with
+    inertia and side grip), rolling resistance (with scrub). Contact friction and latency are drawn
+    evenly from 0 to their maximum.
+    """
+
+    motor_gain_sigma: Spread = 0.03
+    free_speed_sigma: Spread = 0.0
+    mass_sigma: Spread = 0.02
+    rolling_sigma: Spread = 0.10
+    friction_max: Annotated[float, Field(ge=0, le=1)] = 0.3
+    latency_max_s: Annotated[float, Field(ge=0, le=0.1)] = 0.1  # not above a telemetry period
 
 
 class Plant(Model):

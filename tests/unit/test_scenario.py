@@ -73,6 +73,10 @@ BAD_VALUES: dict[str, tuple[Edit, str]] = {
         lambda t: t.update(obstacles=[{"at": dict(t["fleet"][0]["start"]), "radius_m": 0.0}]),
         "obstacles.0.radius_m",
     ),
+    "a twin that answers too late": (
+        lambda t: t.update(uncertainty={"latency_max_s": 0.2}),
+        "uncertainty.latency_max_s",
+    ),
     "fence without an inside": (lambda t: t.update(geofence=fence(-9.0)), "geofence is empty"),
     "fault of a stranger": (lambda t: t["faults"][0].update(vehicle=9), "not in the fleet"),
     "fault of motor 5": (lambda t: t["faults"][0].update(instances=[5]), "the highest is 4"),
@@ -210,9 +214,11 @@ def test_the_station_view_holds_no_truth(tmp_path: Path) -> None:
     scenario = load_scenario(RESCUE)
     view = station_view(scenario, 15000, 42)
     text = view.model_dump_json()
-    for secret in ("rescue", "fault", "plant", "motor_gain", "expect", "description", "start_m"):
+    for secret in ("rescue", "fault", "plant", "expect", "description", "start_m"):
         assert secret not in text
     assert '"seed"' not in text
+    elsewhere = load_scenario(RESCUE, ["plant.motor_gain_sigma=0.29", "plant.rolling_sigma=0.0"])
+    assert station_view(elsewhere, 15000, 42) == view
     path = tmp_path / "view.json"
     path.write_text(text)
     assert load_station_view(path) == view

@@ -24,14 +24,16 @@ from base_station.twin import (
 )
 from base_station.twin.search import near_pairs
 from hil.airframe import OMNI_PLUS
-from hil.scenario import FleetMember, load_scenario, station_view
+from hil.scenario import FleetMember, Uncertainty, load_scenario, station_view
 
 RESCUE = Path(__file__).parents[2] / "scenarios" / "rescue.yaml"
 NAN = math.nan
 STILL = [0.0, 0.0, NAN]
 
 
-def fleet(count: int, half_size_m: float = 50.0, yaw: str = "locked") -> FleetModel:
+def fleet(
+    count: int, half_size_m: float = 50.0, yaw: str = "locked", unsure: Uncertainty | None = None
+) -> FleetModel:
     view = station_view(load_scenario(RESCUE), 14550, 1)
     sides = ("north_min_m", "north_max_m", "east_min_m", "east_max_m")
     signs = (-1, 1, -1, 1)
@@ -40,9 +42,9 @@ def fleet(count: int, half_size_m: float = 50.0, yaw: str = "locked") -> FleetMo
     )
     member: FleetMember = view.fleet[0]
     members = tuple(member.model_copy(update={"sysid": i + 1}) for i in range(count))
-    return FleetModel.from_view(
-        view.model_copy(update={"fleet": members, "arena": arena, "yaw": yaw})
-    )
+    changed = {"fleet": members, "arena": arena, "yaw": yaw}
+    changed["uncertainty"] = unsure or view.uncertainty
+    return FleetModel.from_view(view.model_copy(update=changed))
 
 
 def healthy(model: FleetModel):
@@ -208,3 +210,17 @@ def test_draws_stay_within_what_is_declared():
     assert (deceleration / deceleration.mean()).std() == pytest.approx(0.10, rel=0.05)
     assert 0.0 <= draws.friction.min() <= draws.friction.max() <= 0.3
     assert 0.0 <= draws.latency_s.min() <= draws.latency_s.max() <= 0.1
+    assert (draws.free_speed_mps == model.nominal.free_speed_mps).all()
+
+
+def test_the_view_declares_the_ranges():
+    """Draws of the other parameters are the same, whether the free speed is unsure or not."""
+    unsure = Uncertainty(free_speed_sigma=0.05, friction_max=0.1, latency_max_s=0.02)
+    model = fleet(2, unsure=unsure)
+    draws = perturbed(model, np.random.default_rng(0), 4000)
+    speed = draws.free_speed_mps / model.nominal.free_speed_mps
+    assert speed.std() == pytest.approx(0.05, rel=0.05)
+    assert draws.friction.max() == pytest.approx(0.1, rel=0.01)
+    assert draws.latency_s.max() == pytest.approx(0.02, rel=0.01)
+    plain = perturbed(fleet(2), np.random.default_rng(0), 4000)
+    assert (plain.mass_kg == draws.mass_kg).all()
