@@ -12,6 +12,7 @@ from base_station.desk import Desk
 from base_station.execution import Orders
 from base_station.phases import Concluding, Experimenting, PlanningAlpha, Settling
 from base_station.planning.requests import OpenLoopPlan
+from base_station.planning.tasks.objectives import GAIN
 from base_station.receiving.telemetry import Frame
 from base_station.steps.travelling import request_beta
 
@@ -100,7 +101,7 @@ def announced(plan: OpenLoopPlan) -> str:
     return (
         f"{text}; {told.information_bits:.2f} of {told.open_bits:.2f} bit, "
         f"{told.information_low_bits:.2f} in the worst tenth; {told.energy_j:.0f} J; "
-        f"{touches or 'no contact'}"
+        f"cost {told.cost:.2f} of {GAIN:.0f}; {touches or 'no contact'}"
     )
 
 

@@ -36,7 +36,7 @@ class Planning(Model):
         "ppo", "ppo_lstm", "qtable", "dqn", "cem", "shooting", "random", "gradient", "ram"
     ] = "ppo"
     exploration: Literal["greedy", "epsilon", "boltzmann"] = "epsilon"
-    objective: Literal["paper_distance", "paper_printed", "information"] = "paper_distance"
+    objective: Literal["paper_distance", "paper_printed", "information"] = "information"
     preset: Literal["tuned", "paper"] = "tuned"
     suspect: Literal["held", "commanded"] = "held"
     alpha_horizon_s: Horizon = 8.0

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planning_scenes import experiment, planning
+from planning_scenes import experiment, planning, walled
 
 from base_station.planning.planner import plan
 from base_station.planning.policy import to_setpoints
@@ -16,7 +16,7 @@ from base_station.planning.tasks.evaluation import INVALID
 from base_station.planning.tasks.limits import clearance_m, closing_mps
 from base_station.steps.diagnosing import announced
 from base_station.twin import V_EAST, FleetModel, initial_state
-from hil.scenario import StationView
+from hil.scenario import Geofence, StationView
 from hil.scenario.station import Safety
 
 
@@ -99,6 +99,46 @@ def test_closing_speed_and_clearance_in_closed_form(rescue_view):
     assert clearance_m(states, model)[0] + model.vehicles.radius_m == pytest.approx([3, 3, 4])
 
 
+def test_the_margin_counts_from_obstacles_too(rescue_view):
+    """A wall 0.5 m wide along the drive of rover 1; its rims are 0.6 m apart at the end of it."""
+    beside = walled(rescue_view, (1.15, -4.0, 1.15, 0.0, 0.25))
+    model = FleetModel.from_view(beside)
+    states = initial_state([[0.0, -2.5], [0.0, 1.0], [2.4, -1.0]], [0.0] * 3)[None]
+    radius = float(model.vehicles.radius_m[0])
+    past_the_end = np.hypot(1.15, 1.0)
+    expected = np.array([[1.15, past_the_end, 1.25]]) - 0.25 - radius
+    assert clearance_m(states, model) == pytest.approx(expected)
+    room = float(expected[0, 0])
+    for margin_m, valid in ((room - 0.2, True), (room + 0.1, False)):
+        error = error_of(limited(beside, wall_margin_m=margin_m), rammed())
+        assert (error < INVALID) == valid
+
+
+@pytest.mark.parametrize(("east_max_m", "valid"), [(4.9, True), (3.1, False)])
+def test_a_geofence_is_as_good_as_a_wall(rescue_view, east_max_m, valid):
+    """Rover 3, 0.3 m in radius, drives from 2.5 m east to 3.0 m: over the second fence."""
+    fence = Geofence(north_min_m=-3.0, north_max_m=6.0, east_min_m=-5.0, east_max_m=east_max_m)
+    view = rescue_view.model_copy(update={"geofence": fence})
+    actions = rammed()
+    actions[0, :2, 3] = 0.5
+    assert (error_of(view, actions) < INVALID) == valid
+
+
+def test_who_touches_a_wall_is_thrown_away(rescue_view):
+    into = rammed()
+    into[0, :, 3] = 1.0  # meanwhile rover 3 drives into the eastern wall, 2.2 m away
+    assert error_of(rescue_view, into) == INVALID
+
+
+@pytest.mark.parametrize("planner", ["shooting", "ram"])
+def test_no_plan_takes_longer_than_is_allowed(rescue_view, planner):
+    view = planning(rescue_view, planner=planner, alpha_horizon_s=5.0, restarts=2)
+    answer = plan(view, experiment(view, apart_m=1.5), lambda _: None)
+    assert answer.plan is not None
+    assert len(answer.plan.setpoints) * answer.plan.period_s == 5.0
+    assert answer.plan.prediction.duration_s == 5.0
+
+
 def test_a_plan_states_what_it_is_expected_to_bring_and_to_cost(rescue_view):
     problem = alpha_problem(rescue_view, experiment(rescue_view))
     (setpoints,) = to_setpoints(rammed(), problem.commands)
@@ -123,6 +163,7 @@ def test_it_is_said_before_it_is_driven_and_survives_the_pipe(rescue_view):
     line = announced(made)
     assert line.startswith("plan alpha: predicted error 0.001 over 8.0 s; 1.00 of 1.00 bit")
     assert "1 and 2 touch" in line
+    assert f"cost {made.prediction.cost:.2f} of 10;" in line
     answer = decode(encode(PlanReady(1, "alpha", (), made)))
     assert isinstance(answer, PlanReady)
     assert answer.plan is not None

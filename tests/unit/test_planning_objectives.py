@@ -71,7 +71,8 @@ def test_a_gentle_experiment_is_worth_more_than_a_rough_one_that_tells_as_much(r
     short[:4, 1], long_[:, 1] = 0.8, 0.8
     returns = nominal_returns(problem, np.stack([short, long_]))
     assert returns[0] > returns[1] > 0.0
-    paper = alpha_problem(rescue_view, experiment(rescue_view, apart_m=1.0))
+    view = planning(rescue_view, objective="paper_distance")
+    paper = alpha_problem(view, experiment(view, apart_m=1.0))
     distances = nominal_returns(paper, np.stack([short, long_]))
     assert distances[1] > distances[0]  # the paper's reward asks for more and more distance
 

@@ -86,7 +86,8 @@ def test_a_met_target_ends_the_search_at_the_next_look(rescue_view):
 
 
 def test_the_gradient_vanishes_where_nothing_touches(rescue_view):
-    problem = alpha_problem(rescue_view, experiment(rescue_view, apart_m=3.5))
+    paper = planning(rescue_view, objective="paper_distance")
+    problem = alpha_problem(paper, experiment(paper, apart_m=3.5))
     climb = gradient(problem, np.random.default_rng(0))
     proposals = next(climb)
     returns = nominal_returns(problem, proposals)
@@ -97,7 +98,8 @@ def test_the_gradient_vanishes_where_nothing_touches(rescue_view):
 
 def test_the_gradient_climbs_where_something_does(rescue_view):
     """From a plan that pushes already, ascent earns more: it is the start that it lacks."""
-    problem = alpha_problem(rescue_view, experiment(rescue_view, apart_m=0.7))
+    paper = planning(rescue_view, objective="paper_distance")
+    problem = alpha_problem(paper, experiment(paper, apart_m=0.7))
     climb = gradient(problem, np.random.default_rng(0))
     earned = []
     proposals = next(climb)
@@ -147,7 +149,8 @@ def test_whoever_gets_behind_a_disc_never_runs_into_it_on_the_way(angle):
     centre, direction = np.zeros((1, 2)), np.array([[0.0, 1.0]])
     position = 2.0 * np.array([[np.cos(angle), np.sin(angle)]])
     for _ in range(400):
-        velocity, ready = get_behind(position, centre, direction, 0.6)
+        place, ready = get_behind(position, centre, direction, 0.6)
+        velocity = 1.5 * (place - position)
         if ready[0]:
             break
         position = position + 0.02 * velocity / max(1.0, np.linalg.norm(velocity))

@@ -59,7 +59,7 @@ def dead(view: StationView) -> None:  # noqa: ARG001
 
 def test_side_by_side_as_one_after_the_other(rescue_view):
     """From here the first ascent ends where it began, and the second one climbs."""
-    view = planning(rescue_view, planner="gradient", restarts=3)
+    view = planning(rescue_view, planner="gradient", objective="paper_distance", restarts=3)
     seen = []
     asked = experiment(view, apart_m=0.7, seed=2)
     with Team(view, 2, cold) as team:

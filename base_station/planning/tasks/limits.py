@@ -18,7 +18,7 @@ PRICE = 1.0  # per pair or vehicle, twin and control period in breach
 @dataclass(frozen=True, eq=False)
 class Limits:
     """`speed_mps` at which two vehicles may meet, `impulse_ns` between two in a control period,
-    `may_touch` [V, V] symmetric, `margin_m` between a vehicle's rim and the arena's walls."""
+    `may_touch` [V, V] symmetric, `margin_m` between a vehicle's rim and walls or obstacles."""
 
     speed_mps: float
     impulse_ns: float
@@ -91,11 +91,17 @@ class Contacts:
 
 
 def clearance_m(states: Array, model: FleetModel) -> Array:
-    """Between rims and the nearest wall, [B, V], for states [B, V, S]."""
+    """Between rims and the nearest wall or obstacle, [B, V], for states [B, V, S]."""
     low, high = model.vehicles.bounds_m[[0, 2]], model.vehicles.bounds_m[[1, 3]]
     position = states[..., NORTH : EAST + 1]
-    inside = np.minimum(position - low, high - position).min(axis=-1)
-    return np.asarray(inside - model.vehicles.radius_m)
+    room = np.minimum(position - low, high - position).min(axis=-1)
+    for north, east, to_north, to_east, brush in model.vehicles.obstacles_m:
+        start = np.array([north, east])
+        way = np.array([to_north, to_east]) - start
+        share = np.clip((position - start) @ way / max(float(way @ way), 1e-12), 0.0, 1.0)
+        nearest = start + share[..., None] * way
+        room = np.minimum(room, np.linalg.norm(position - nearest, axis=-1) - brush)
+    return np.asarray(room - model.vehicles.radius_m)
 
 
 def closing_mps(states: Array) -> Array:
