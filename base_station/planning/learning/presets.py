@@ -1,6 +1,6 @@
 """How each kind of plan is learned; the reasons are in docs/learning.md."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -64,17 +64,10 @@ TUNED_ALPHA = Preset(
     total_timesteps=40_000,
     check_every=10,  # a plan that only just meets the target would rest on a few centimetres
 )
-TUNED_BETA = Preset(
+TUNED_BETA = replace(
+    TUNED_ALPHA,
     environments=64,
-    steps=32,
     batch_size=512,
-    epochs=8,
-    learning_rate=1e-3,
-    gamma=0.99,
-    gae_lambda=0.95,
-    entropy=0.0,
-    value_weight=0.5,
-    value_clip=None,
     initial_log_std=-0.5,
     total_timesteps=180_000,
     check_every=4,

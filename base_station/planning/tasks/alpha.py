@@ -11,9 +11,8 @@ from base_station.planning.tasks.limits import PRICE, Contacts, Limits
 from base_station.planning.tasks.motion import move
 from base_station.planning.tasks.objectives import Moment, Objective, Terms
 from base_station.planning.tasks.starts import scattered
-from base_station.planning.tasks.task import Step
+from base_station.planning.tasks.task import Episodes, Step
 from base_station.twin import (
-    DECLARED,
     EAST,
     HELD_EAST,
     HELD_NORTH,
@@ -24,10 +23,10 @@ from base_station.twin import (
     FaultArrays,
     FleetModel,
     Parameters,
-    Uncertainty,
     perturbed,
     report,
 )
+from hil.scenario import Uncertainty
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -55,7 +54,7 @@ class AlphaProblem:
     objective: Objective
     limits: Limits
     weights: tuple[float, ...]
-    declared: Uncertainty = DECLARED
+    declared: Uncertainty  # of the twins to learn with; plans are judged by the model's own
     start_sigma_m: float = START_SIGMA_M
     near_starts: float = NEAR_START_SHARE  # of the episodes at first; fades to none half-way
 
@@ -138,34 +137,23 @@ def nominal_returns(problem: AlphaProblem, actions: Array) -> Array:
     return total
 
 
-class AlphaTask:
+class AlphaTask(Episodes):
     """E environments x H twins, each environment with physical parameters of its own."""
 
     def __init__(self, problem: AlphaProblem, environments: int, rng: np.random.Generator) -> None:
-        self.environments, self.progress = environments, 0.0
-        self.action_size = problem.commands.size
+        super().__init__(environments, problem.commands.size)
         self._problem, self._rng = problem, rng
         self._parameters = perturbed(problem.model, rng, environments, problem.declared)
         self._states = np.zeros((environments, *problem.start.shape))
         self._memory = problem.objective.begin(problem.reports(self._states))
-        self._elapsed = np.zeros(environments, dtype=np.int64)
         self.observation_size = self.reset().shape[1]
-
-    def reset(self) -> Array:
-        self._begin(np.ones(self.environments, dtype=np.bool_))
-        return self._observe()
 
     def step(self, actions: Array) -> Step:
         problem = self._problem
         setpoints = to_setpoints(actions, problem.commands)
         terms = problem.move(self._parameters, self._states, self._memory, setpoints)
         self._elapsed += 1
-        final = self._observe()
-        dones = self._elapsed >= problem.steps
-        if not dones.any():
-            return Step(final, terms, dones, final)
-        self._begin(dones)
-        return Step(self._observe(), terms, dones, final)
+        return self._stepped(terms, self._elapsed >= problem.steps)
 
     def _observe(self) -> Array:
         return self._problem.observe(self._states, self._memory, self._elapsed)

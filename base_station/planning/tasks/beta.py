@@ -21,7 +21,7 @@ from base_station.planning.policy import (
 )
 from base_station.planning.requests import PolicyWeights
 from base_station.planning.tasks.starts import inside, scattered
-from base_station.planning.tasks.task import Step
+from base_station.planning.tasks.task import Episodes, Step
 from base_station.twin import (
     EAST,
     HELD_EAST,
@@ -123,23 +123,17 @@ class BetaProblem:
         return result
 
 
-class BetaTask:
+class BetaTask(Episodes):
     """E environments of the mission, each with physical parameters of its own."""
 
     def __init__(self, problem: BetaProblem, environments: int, rng: np.random.Generator) -> None:
-        self.environments, self.progress = environments, 0.0
-        self.action_size = problem.commands.size
+        super().__init__(environments, problem.commands.size)
         self._problem, self._rng = problem, rng
         self._parameters = perturbed(problem.model, rng, environments)
         self._states = np.empty((environments, *problem.start.shape))
         self._delivered = np.zeros((environments, problem.model.size), dtype=np.bool_)
-        self._elapsed = np.zeros(environments, dtype=np.int64)
         self._active = np.ones(environments, dtype=np.bool_)
         self.observation_size = self.reset().shape[1]
-
-    def reset(self) -> Array:
-        self._begin(np.ones(self.environments, dtype=np.bool_))
-        return self._problem.observe(self._states, self._delivered, self._elapsed)
 
     def step(self, actions: Array) -> Step:
         problem = self._problem
@@ -153,12 +147,10 @@ class BetaTask:
         if problem.shaped:
             after = problem.potential(self._states, self._delivered)
             terms["shaping"] = np.where(dones, 0.0, after) - before
-        final = problem.observe(self._states, self._delivered, self._elapsed)
-        if not dones.any():
-            return Step(final, terms, dones, final)
-        self._begin(dones)
-        observations = problem.observe(self._states, self._delivered, self._elapsed)
-        return Step(observations, terms, dones, final)
+        return self._stepped(terms, dones)
+
+    def _observe(self) -> Array:
+        return self._problem.observe(self._states, self._delivered, self._elapsed)
 
     def _base(self, at_goal: Flags, walls: Flags) -> dict[str, Array]:
         problem = self._problem

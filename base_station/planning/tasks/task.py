@@ -1,5 +1,6 @@
 """What is learned, seen from the learner: many environments that step together."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -45,3 +46,31 @@ class Task(Protocol):
     def reset(self) -> Array: ...
 
     def step(self, actions: Array) -> Step: ...
+
+
+class Episodes(ABC):
+    """What the tasks have in common: episodes that end, and new ones in their places."""
+
+    def __init__(self, environments: int, action_size: int) -> None:
+        self.environments, self.action_size, self.progress = environments, action_size, 0.0
+        self._elapsed = np.zeros(environments, dtype=np.int64)
+
+    def reset(self) -> Array:
+        self._begin(np.ones(self.environments, dtype=np.bool_))
+        return self._observe()
+
+    def _stepped(self, terms: dict[str, Array], dones: Flags) -> Step:
+        """The end of a control period: those that are done start anew."""
+        final = self._observe()
+        if not dones.any():
+            return Step(final, terms, dones, final)
+        self._begin(dones)
+        return Step(self._observe(), terms, dones, final)
+
+    @abstractmethod
+    def _begin(self, which: Flags) -> None:
+        """New episodes where `which` [E]; their time is 0."""
+
+    @abstractmethod
+    def _observe(self) -> Array:
+        """[E, O]"""
