@@ -1,7 +1,7 @@
 """How often does a planner succeed from scratch, without restarts, and what does it cost?
 
     python benchmarks/trainings.py [--trainings 10] [--cases near far beta] [--preset tuned paper]
-                                   [--planner ppo cem ...] [--objective paper_distance ...]
+                                   [--planner ppo cem ...] [--objective information ...]
 
 One seed after the other on one thread; times are CPU seconds of this process. near and far: three
 rovers in a row 2.5 or 4.3 m apart, the suspect held, `motor_y_off` or `gps_east_stuck`. beta: the
@@ -22,6 +22,7 @@ from base_station.planning.laboratory.jobs import Job
 from base_station.planning.laboratory.measure import APART_M, row_of_three
 from base_station.planning.laboratory.tables import wilson
 from base_station.planning.planner import plan
+from base_station.planning.process import warm_up
 from base_station.planning.requests import PlanRequest
 from hil.scenario import StationView, load_scenario, station_view
 
@@ -56,6 +57,7 @@ def main() -> None:
 
 def rows(options: argparse.Namespace) -> Iterator[Row]:
     view = station_view(load_scenario(RESCUE), mavlink_port_base=14550, station_seed=1)
+    warm_up(view)
     kinds = product(options.cases, options.planner, options.objective, options.preset)
     for case, planner, objective, preset in kinds:
         changes = {"planner": planner, "objective": objective, "restarts": 0}
@@ -82,7 +84,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--cases", nargs="+", choices=APART_M, default=list(APART_M))
     parser.add_argument("--planner", nargs="+", default=["ppo"])
-    parser.add_argument("--objective", nargs="+", default=["paper_distance"])
+    parser.add_argument("--objective", nargs="+", default=["information"])
     parser.add_argument("--preset", nargs="+", default=["tuned"])
     return parser.parse_args()
 
