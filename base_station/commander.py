@@ -14,6 +14,7 @@ ARM_REPEAT_S = 0.5
 REPEAT_S = 0.2  # of a mode: until it has been taken, a vehicle does something else
 LOSSY, MISSED = 0.01, 0.01  # from which loss on; the chance that is left of missing all copies
 STICK_US = 100
+LATE, ANSWERED_S = 3.0, 0.2  # until no answer comes any more: standard deviations, and at least
 SURE = 0.7  # of the round trip: it varies
 SURE_BEATS = 2
 TAKEOVER_S = 2.5  # longer than two heartbeats: a late one must not look like a takeover
@@ -26,6 +27,7 @@ class _Sent:
     mode: int | None = None
     time_s: float = float("-inf")
     asked_s: float = float("-inf")  # the first time
+    before_s: float = float("-inf")  # when another mode was asked for last
     confirmed: bool = False
     obeyed: bool = False  # it has been in a mode of ours
     was_armed: bool = False
@@ -55,14 +57,19 @@ class Commander:
     def acknowledged(self, index: int, track: Track, time_s: float) -> int | None:
         """A vehicle took a change of mode: to which; None if it can't be the last one asked for.
 
-        An answer does not say what it answers, but none comes faster than the round trip.
+        An answer does not say what it answers, but none comes faster than the round trip, and few
+        much later: copies of the order before are answered, too.
         """
-        sent = self._sent[index]
-        soon = time_s - sent.asked_s < SURE * track.round_trip_s - 1.0 / self._rate_hz
-        return None if soon else sent.mode
+        sent, trip_s = self._sent[index], track.round_trip_s
+        soon = time_s - sent.asked_s < SURE * trip_s - 1.0 / self._rate_hz
+        late_s = trip_s + LATE * track.jitter_s + ANSWERED_S
+        return None if soon or time_s - sent.before_s < late_s else sent.mode
 
     def carry_out(self, orders: Orders, tracks: list[Track], time_s: float) -> list[Command]:
-        """Mode changes where the mode is not what it should be, and set-points where driven."""
+        """Mode changes where the mode is not what it should be, and set-points where driven.
+
+        Set-points of 0 go with an order to stand until it has been taken: it may get lost.
+        """
         commands: list[Command] = []
         for i, member in enumerate(self._view.fleet):
             if i in self.released:
@@ -71,7 +78,9 @@ class Commander:
             if self._is_strayed(i, driven, tracks[i].status, time_s):
                 continue
             commands += self._mode(i, member.sysid, driven, tracks[i], time_s)
-            if driven or self.autopilots[i].needs_setpoints_first:
+            sent = self._sent[i]
+            goes_on = not sent.confirmed and sent.before_s > float("-inf")
+            if driven or goes_on or self.autopilots[i].needs_setpoints_first:
                 north, east, yaw = (float(x) for x in orders.setpoints[i])
                 heading = None if yaw != yaw else yaw
                 commands.append(Drive(member.sysid, time_s, north, east, heading))
@@ -91,9 +100,9 @@ class Commander:
         repeat_s = max(REPEAT_S, 1.5 * track.round_trip_s)
         if not changed and (sent.confirmed or time_s - sent.time_s < repeat_s):
             return []  # one that was in it and has left is not argued with
-        asked_s = time_s if changed else sent.asked_s
+        asked_s, before_s = (time_s, sent.time_s) if changed else (sent.asked_s, sent.before_s)
         self._sent[index] = replace(
-            sent, mode=wanted, time_s=time_s, asked_s=asked_s, confirmed=False
+            sent, mode=wanted, time_s=time_s, asked_s=asked_s, before_s=before_s, confirmed=False
         )
         return [SetMode(sysid, wanted)] * _copies(track.loss(time_s, 1.0 / self._rate_hz))
 

@@ -25,11 +25,11 @@ SETPOINT_KEPT_S = 3.0  # an autopilot forgets a set-point that is older (ArduPil
 
 @dataclass(frozen=True, eq=False)
 class Gap:
-    """Since when, under which orders, and since when all vehicles have been heard again."""
+    """Since when, under which orders, and since when all vehicles have been heard to stand."""
 
     since_s: float
     orders: Orders
-    heard_since_s: float | None = None
+    standing_since_s: float | None = None
 
     def obeyed(self, frame: Frame, sent: Orders, live: bool) -> Orders:
         """What the vehicles did up to `frame`.
@@ -47,14 +47,14 @@ class Gap:
         )
 
     def at(self, frame: Frame, live: bool) -> "Gap":
-        if not (live and frame.fresh.all()):
-            return replace(self, heard_since_s=None)
-        since_s = frame.time_s if self.heard_since_s is None else self.heard_since_s
-        return replace(self, heard_since_s=since_s)
+        if not (live and frame.all_stand):
+            return replace(self, standing_since_s=None)
+        since_s = frame.time_s if self.standing_since_s is None else self.standing_since_s
+        return replace(self, standing_since_s=since_s)
 
     def is_over(self, frame: Frame) -> bool:
         """Heard, and at rest: in HOLD for long enough."""
-        since_s = self.heard_since_s
+        since_s = self.standing_since_s
         return since_s is not None and frame.time_s - since_s >= execution.REST_S
 
 

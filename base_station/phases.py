@@ -20,6 +20,9 @@ class Connecting:
 
 @dataclass(frozen=True)
 class Arming:
+    """`standing_since_s`: armed, and in HOLD; from then on the links are waited for."""
+
+    standing_since_s: float | None = None
     name: Phase = "arm"
 
 

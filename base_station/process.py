@@ -224,7 +224,7 @@ def _compile_twin(view: StationView) -> None:
     watch = Watch(view, Baseline(twin.FleetModel.from_view(view)), state, 0.0)
     still, fresh = np.zeros((len(goals), 2)), np.ones(len(goals), dtype=np.bool_)
     none = np.zeros(len(goals))
-    frame = Frame(0.0, still, still, none, fresh, none, none, driven=~fresh)
+    frame = Frame(0.0, still, still, none, fresh, fresh, none, none, none, ~fresh)
     watch.tick(frame, hold(len(goals)))
 
 

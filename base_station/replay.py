@@ -5,7 +5,7 @@ by others. What the station would decide now is compared with what it decided.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Any
 
@@ -29,7 +29,7 @@ from base_station.records import Event, EventKind
 from base_station.sent import SentOrders, sent_orders
 from base_station.station import Station
 from base_station.steps.diagnosing import conclude, settle
-from base_station.steps.probing import probe
+from base_station.steps.probing import get_ready, probe
 from hil import mavlink
 from hil.scenario import StationView
 
@@ -75,7 +75,7 @@ def replay(view: StationView, frames: Iterable[Stamped]) -> tuple[Event, ...]:
         return tuple(event for event in events if event.kind in (*DECISIONS, "end"))
     following = _Following(sent_orders(view, heard))
     offset_us = _clock_offset_us(heard, view.station_sysid)
-    events = _watched(view, heard, Station(view, following.decide), offset_us)
+    events = _watched(view, heard, Station(view, following.decide, get_ready), offset_us)
     return tuple(event for event in events if event.kind in DECISIONS)
 
 
@@ -154,9 +154,11 @@ class _Overhearing(_Following):
         if not desk.ended and (unknown := self._sent.unknown(frame.time_s)):
             who, why = unknown
             desk.stop(f"{desk.view.fleet[who].name} {why}: what moves it is not in the log")
-        if isinstance(desk.phase, Settling) and self.moves(self._sent.at(frame.time_s)):
+        orders = self._sent.at(frame.time_s)
+        if isinstance(desk.phase, Settling) and self.moves(orders):
             desk.enter(PlanningBeta(0))  # once more when they are at rest
-        return super().decide(desk, frame)
+        told_to_move = (orders.setpoints[:, :2] != 0.0).any(axis=1)
+        return super().decide(desk, replace(frame, driven=frame.driven & told_to_move))
 
 
 def _in_the_log(vehicles: int) -> OpenLoopPlan:

@@ -85,7 +85,7 @@ class Station:
         self._touched_s: dict[tuple[int, int], float] = {}
         self._held: frozenset[Held] = frozenset()
         self._beats_s = (float("-inf"), float("-inf"))  # last heartbeat: wall, fleet
-        self._asked_time_s = float("-inf")
+        self._asked_time_s = (float("-inf"), float("-inf"))  # last TIMESYNC: wall, fleet
         self._stepped_wall_s: float | None = None
         self._silent: frozenset[int] = frozenset()  # vehicles that have not been heard for long
         self._gap: Gap | None = None
@@ -178,8 +178,8 @@ class Station:
         if max(wall_s - self._beats_s[0], fleet_s - self._beats_s[1]) >= HEARTBEAT_S:
             self._beats_s = (wall_s, fleet_s)
             commands += [Heartbeat(m.sysid) for m in firsts]
-        if wall_s - self._asked_time_s >= TIMESYNC_S:
-            self._asked_time_s = wall_s
+        if max(wall_s - self._asked_time_s[0], fleet_s - self._asked_time_s[1]) >= TIMESYNC_S:
+            self._asked_time_s = (wall_s, fleet_s)
             commands += [AskTime(m.sysid, int(wall_s * 1e9)) for m in firsts]
         return commands
 
@@ -189,7 +189,7 @@ class Station:
         if silent_since_s is not None:
             self._open_gap(silent_since_s)
         live = desk.fleet.newest_s - frame.time_s < GAP_S / 2
-        obeyed = desk.orders
+        obeyed, heard = desk.orders, frame
         if self._gap is not None:
             obeyed = self._gap.obeyed(frame, desk.orders, live)
             frame = replace(frame, driven=obeyed.driven)
@@ -204,7 +204,7 @@ class Station:
             self._mind_the_time()
             desk.orders = self._decide(desk, frame)
         else:
-            self._mind_the_gap(self._gap.at(frame, live), frame)
+            self._mind_the_gap(self._gap.at(heard, live), frame)
         return self._commander.carry_out(desk.orders, desk.fleet.tracks, frame.time_s)
 
     def _open_gap(self, since_s: float) -> None:

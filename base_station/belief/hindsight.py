@@ -41,7 +41,7 @@ class Hindsight:
         times = np.array([m.frame.time_s for m in memory])
         start = int(np.searchsorted(times, between_s[0] - ONSET_MARGIN_S)) - 1
         first = memory[max(0, start)]
-        sent = tuple(m.orders for m in memory[: max(0, start) + 1])
+        sent = [(m.orders, m.frame) for m in memory[: max(0, start) + 1]]
         rng = np.random.default_rng(round(between_s[1] * 1000))
         drawn = particles.draw(baseline, twins, rng)
         rows = particles.DRAWS * len(twins)

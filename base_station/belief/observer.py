@@ -22,6 +22,7 @@ Flags = NDArray[np.bool_]
 
 MEMBERS = 16
 REPORT_ERROR_M = 0.01  # slow error of a report: GPS wander, what is left of noise after a second
+SLIP = 0.3  # of the motion in a contact
 DRAW = 0  # the ensemble is a set of test points, not an experiment: the same ones every time
 
 
@@ -29,13 +30,15 @@ DRAW = 0  # the ensemble is a set of test points, not an experiment: the same on
 class Observer:
     """M members: `parameters` (P = M), `report_error_m` [M, V, 2], `states` [M, V, S].
 
-    Each has heard of the orders what its link let through.
+    Each has heard of the orders what its link let through. `slack_m` [V]: how far off a vehicle may
+    be because it touches another: who slips where is not for a twin of discs to know.
     """
 
     parameters: twin.Parameters
     report_error_m: Array
     states: Array
     hearing: Hearing
+    slack_m: Array
 
 
 def start(model: twin.FleetModel, state: Array) -> Observer:
@@ -47,7 +50,8 @@ def start(model: twin.FleetModel, state: Array) -> Observer:
     error_m = REPORT_ERROR_M * rng.standard_normal((MEMBERS, model.size, 2))
     error_m[0] = 0.0
     heard = hearing.nothing_yet(MEMBERS, model.size)
-    return Observer(drawn, error_m, np.repeat(state[None], MEMBERS, axis=0), heard)
+    states = np.repeat(state[None], MEMBERS, axis=0)
+    return Observer(drawn, error_m, states, heard, np.zeros(model.size))
 
 
 def moved(
@@ -64,7 +68,19 @@ def moved(
     after = twin.advance(
         model, observer.parameters, faults, observer.states, setpoints, driven, period_s
     )
-    return replace(observer, states=after.states, hearing=heard), after.impulses_ns[0]
+    slack_m = observer.slack_m + _slip_m(observer.states, after.states, after.impulses_ns)
+    moved = replace(observer, states=after.states, hearing=heard, slack_m=slack_m)
+    return moved, after.impulses_ns[0]
+
+
+def _slip_m(before: Array, after: Array, impulses_ns: Array) -> Array:
+    """[V]: a share of the way that it, or who touches it in any member, has just moved."""
+    steps = (after - before)[..., twin.NORTH : twin.EAST + 1]
+    way_m = np.hypot(steps[..., 0], steps[..., 1]).max(axis=0)
+    touch = (impulses_ns > 0.0).any(axis=0)
+    touch |= touch.T
+    moved_m = np.where(touch, np.maximum(way_m, way_m[:, None]), 0.0)
+    return np.asarray(SLIP * moved_m.max(axis=1))
 
 
 def spread_m(reports_m: Array) -> Array:
@@ -75,7 +91,9 @@ def spread_m(reports_m: Array) -> Array:
 def drawn(observer: Observer, frame: Frame, trusted: Flags, gain: Array) -> Observer:
     """Every member drawn by `gain` [V, 1] towards what it sees of a frame; `trusted` [V, 2]."""
     seen_m = frame.position_m + observer.report_error_m
-    return replace(observer, states=corrected(observer.states, frame, seen_m, trusted[None], gain))
+    states = corrected(observer.states, frame, seen_m, trusted[None], gain)
+    slack_m = np.where(frame.fresh, (1.0 - gain[:, 0]) * observer.slack_m, observer.slack_m)
+    return replace(observer, states=states, slack_m=slack_m)
 
 
 def at_rest(observer: Observer, frame: Frame, trusted: Flags) -> Observer:
@@ -83,7 +101,11 @@ def at_rest(observer: Observer, frame: Frame, trusted: Flags) -> Observer:
     there = drawn(observer, frame, trusted, np.ones((1, 1)))
     for column in (twin.V_NORTH, twin.V_EAST, twin.YAW_RATE, twin.I_X, twin.I_Y):
         there.states[..., column] = 0.0
-    return replace(there, hearing=hearing.nothing_yet(MEMBERS, len(frame.fresh)))
+    return replace(
+        there,
+        hearing=hearing.nothing_yet(MEMBERS, len(frame.fresh)),
+        slack_m=np.zeros(len(frame.fresh)),
+    )
 
 
 def corrected(states: Array, frame: Frame, seen_m: Array, trusted: Flags, gain: Array) -> Array:

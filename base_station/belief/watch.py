@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from base_station import twin
-from base_station.belief import detection, observer
+from base_station.belief import detection, hearing, observer
 from base_station.belief.hypotheses import NONE, Hypothesis
 from base_station.execution import Orders
 from base_station.receiving.telemetry import Frame
@@ -28,6 +28,7 @@ NOISE_SIGMA_M = 0.02  # of one report after the vehicle's filter
 SPREAD_FACTOR = (
     2.5  # a vehicle keeps its parameters: its error is one draw, not a new one each tick
 )
+LINK_FACTOR = 2.5  # more where the link is bad: what it does to orders is not Gaussian
 NOISY_M = 0.1  # a noisier report is followed the more slowly
 MEMORY_S = 60.0
 
@@ -138,7 +139,8 @@ class Watch:
         reports_m = twin.report(expected.states, self._faults)
         # a wall pins all members, but not the slow error of the reports
         slow_m = np.maximum(observer.spread_m(reports_m), observer.REPORT_ERROR_M)
-        spread_m = SPREAD_FACTOR * slow_m
+        factor = SPREAD_FACTOR + LINK_FACTOR * hearing.trouble(frame, self._period_s)[:, None]
+        spread_m = factor * slow_m + expected.slack_m[:, None]
         self.sigma_m = np.sqrt(NOISE_SIGMA_M**2 + self._noise_m**2 + spread_m**2)
         self.residual = (frame.position_m - reports_m[0]) / self.sigma_m
         self.cusum = detection.update(self.cusum, self.residual, frame.time_s)

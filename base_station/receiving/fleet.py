@@ -1,5 +1,7 @@
 """The receiving side: messages of all vehicles to tracks, on one clock, cut into ticks."""
 
+import math
+from collections import deque
 from dataclasses import replace
 
 from base_station.autopilots import adapter
@@ -13,6 +15,8 @@ WAIT_FOR_LATE_S = 0.3  # fleet time; then a tick goes on without the vehicle tha
 LINK_LOST_WALL_S = 5.0
 LINK_GIVEN_UP_WALL_S = 60.0
 ANSWER_WITHIN_S = 30.0  # a TIMESYNC answer to what was asked later than now, or long ago, is none
+JUST_HEARD_WALL_S = 0.5
+KEPT_REPORTS = 1024  # how far back it is known what had been heard
 LONG_GAP_S = 6.0  # after that long without a command nothing moves: no need to tick through it
 
 
@@ -28,6 +32,7 @@ class Fleet:
             LocalOrigin(view.origin.origin()) if a.has_own_origin else None
             for a in self._autopilots
         ]
+        self._newest: deque[tuple[float, float]] = deque(maxlen=KEPT_REPORTS)  # wall, fleet time
         self._next_tick = 0  # in ticks of 1 / telemetry_hz of fleet time
 
     @property
@@ -51,12 +56,13 @@ class Fleet:
             north, east = (value.position_m[k] + offset_m[k] for k in (0, 1))
             v_north, v_east, _ = value.velocity_mps
             track.position(Sample(time_s, (north, east), (v_north, v_east)))
+            self._newest.append((wall_s, self.newest_s))
         elif isinstance(value, mavlink.Timesync) and value.tc1_ns:
             now_ns = int(wall_s * 1e9)
             if 0 <= now_ns - value.ts1_ns <= ANSWER_WITHIN_S * 1e9:
                 self._clock.reply(member.sysid, value.tc1_ns, value.ts1_ns, now_ns)
-                # a vehicle whose clock goes backwards is no reason to look into the future
-                track.round_trip_s = max(0.0, self._clock.round_trip_s(member.sysid))
+                arrived_s = self._clock.fleet_time_s(member.sysid, 1e-9 * value.tc1_ns)
+                track.answered(arrived_s - self._newest_at(1e-9 * value.ts1_ns))
 
     def fleet_time_s(self, index: int, boot_s: float) -> float:
         """A vehicle's own time as fleet time."""
@@ -91,11 +97,9 @@ class Fleet:
         frames: list[Frame] = []
         while self._is_due(self._next_tick * self.period_s):
             time_s = self._next_tick * self.period_s
-            waited_s = min(self.newest_s - time_s, WAIT_FOR_LATE_S)
-            delays_s = [waited_s + track.round_trip_s for track in self.tracks]
             pairs = zip(self.tracks, self._autopilots, strict=True)
             driven = [t.mode_at(time_s - self.period_s) == a.driven_mode for t, a in pairs]
-            frames.append(frame_at(self.tracks, time_s, self.period_s, delays_s, driven))
+            frames.append(frame_at(self.tracks, time_s, self.period_s, self.newest_s, driven))
             self._next_tick += 1
             if len(frames) == round(LONG_GAP_S / self.period_s):
                 newest = int((self.newest_s + 1e-3) / self.period_s)
@@ -106,6 +110,13 @@ class Fleet:
         """Silence of vehicles does not count while the station itself was not listening."""
         for track in self.tracks:
             track.last_heard_wall_s += absent_s
+
+    def _newest_at(self, wall_s: float) -> float:
+        """Fleet time of the newest report, just heard at `wall_s`; NaN: there is none."""
+        for heard_s, newest_s in reversed(self._newest):
+            if heard_s <= wall_s + 1e-6:
+                return newest_s if wall_s - heard_s < JUST_HEARD_WALL_S else math.nan
+        return math.nan
 
     def _is_due(self, time_s: float) -> bool:
         times = [t.newest_s() for t in self.tracks]

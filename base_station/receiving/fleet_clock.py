@@ -2,7 +2,6 @@
 
 from collections import deque
 from dataclasses import dataclass
-from statistics import median
 
 KEPT_ROUNDS = 20
 
@@ -25,16 +24,12 @@ class FleetClock:
         self._rounds: dict[int, deque[tuple[int, int]]] = {
             s: deque(maxlen=KEPT_ROUNDS) for s in sysids
         }  # (summed round trips, offset), ns
-        self._heard: dict[int, deque[tuple[int, _Reply]]] = {
-            s: deque(maxlen=KEPT_ROUNDS) for s in sysids
-        }  # (own time, reply), ns
         self._open: dict[int, dict[int, _Reply]] = {}
 
     def reply(self, sysid: int, tc1_ns: int, ts1_ns: int, now_ns: int) -> None:
         """A TIMESYNC answer arrived at `now_ns` of the station's clock."""
         replies = self._open.setdefault(ts1_ns, {})
         replies[sysid] = _Reply(tc1_ns, now_ns - ts1_ns)
-        self._heard[sysid].append((now_ns, replies[sysid]))
         reference = replies.get(self._reference)
         if reference is not None:
             for other, r in replies.items():
@@ -44,15 +39,6 @@ class FleetClock:
             self._open[ts1_ns] = {self._reference: reference}
         for old in sorted(self._open)[:-KEPT_ROUNDS]:
             del self._open[old]
-
-    def round_trip_s(self, sysid: int) -> float:
-        """A vehicle's usual round trip, in its own time, which may run faster than ours."""
-        heard = self._heard[sysid]
-        if len(heard) < 2:
-            return 0.0
-        (first_ns, first), (last_ns, last) = heard[0], heard[-1]
-        pace = (last.boot_ns - first.boot_ns) / max(last_ns - first_ns, 1)
-        return 1e-9 * pace * median(reply.round_trip_ns for _, reply in heard)
 
     def fleet_time_s(self, sysid: int, boot_s: float) -> float:
         """A vehicle's own time as fleet time; as it is while nothing is known of its offset."""

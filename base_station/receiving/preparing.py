@@ -1,4 +1,4 @@
-"""Before a vehicle is driven: rates asked for and checked, settings set and read back, its origin.
+"""Before a vehicle is driven: rates, settings, its origin, its clock and how far away it is.
 
 Pure: what is heard goes in, commands and words come out. `wall_s` is any monotonic clock.
 """
@@ -7,11 +7,13 @@ from collections import deque
 from collections.abc import Mapping
 
 from base_station.autopilots import Autopilot, Rate, Setting
-from base_station.commands import AskRate, Command, RequestMessage, SetParameter
+from base_station.commands import AskRate, AskTime, Command, RequestMessage, SetParameter
 from hil import mavlink
 from hil.scenario import FleetMember
 
 REPEAT_S = 1.0
+ASK_TIME_S = 0.1
+ANSWERS = 5  # to TIMESYNC, until the link's delay and its spread are known
 RATE_WINDOW = 20  # messages
 RATE_SLACK = 0.7  # of the rate asked for: below, it is not honoured
 SETTLED_S = 5.0  # of vehicle time after the first word, until rates are judged
@@ -37,6 +39,8 @@ class Preparation:
         self._arrivals: dict[int, deque[float]] = {
             int(r.message): deque(maxlen=RATE_WINDOW) for r in self._rates
         }
+        self._answers = 0
+        self._asked_time_s = float("-inf")
         self._first_s: float | None = None
         self._now_s = float("-inf")  # vehicle time
         self._asked_s = float("-inf")
@@ -50,6 +54,8 @@ class Preparation:
                 self._first_s = self._now_s if self._first_s is None else self._first_s
             case mavlink.GpsOrigin() | mavlink.HomePosition():
                 self._located = True
+            case mavlink.Timesync(tc1_ns=answer) if answer:
+                self._answers += 1
             case mavlink.ParamValue():
                 for setting in self._read:
                     if value.name in setting.names:
@@ -60,12 +66,16 @@ class Preparation:
             self._arrivals[int(value.ID)].append(self._now_s)
 
     def asks(self, wall_s: float) -> list[Command]:
-        """What is still to be asked, each second of wall time."""
-        if wall_s - self._asked_s < REPEAT_S:
-            return []
-        self._asked_s = wall_s
+        """What is still to be asked, each second of wall time; the time more often."""
         sysid = self._member.sysid
-        commands: list[Command] = [AskRate(sysid, r.message, r.hz) for r in self._slow()]
+        asked: list[Command] = []
+        if self._answers < ANSWERS and wall_s - self._asked_time_s >= ASK_TIME_S:
+            self._asked_time_s = wall_s
+            asked.append(AskTime(sysid, int(wall_s * 1e9)))
+        if wall_s - self._asked_s < REPEAT_S:
+            return asked
+        self._asked_s = wall_s
+        commands: list[Command] = [*asked, *(AskRate(sysid, r.message, r.hz) for r in self._slow())]
         if not self._located:
             wanted = (mavlink.MessageId.GPS_GLOBAL_ORIGIN, mavlink.MessageId.HOME_POSITION)
             commands += [RequestMessage(sysid, message) for message in wanted]
@@ -75,16 +85,18 @@ class Preparation:
 
     @property
     def done(self) -> bool:
-        """Settings read back as wanted, origin known, and rates honoured or complained of."""
-        return not self._unset() and self._located and (not self._slow() or self._settled)
+        """Settings read back, origin known, and rates and the time told or complained of."""
+        told = not self._slow() and self._answers >= ANSWERS
+        return not self._unset() and self._located and (told or self._settled)
 
     def warnings(self) -> tuple[str, ...]:
-        """Rates that are not honoured, in words, once."""
+        """Rates that are not honoured, and a time that is not told, in words, once."""
         if self.warned or not self._settled:
             return ()
         self.warned = True
         rates = self.measured_hz()
-        return tuple(
+        silent = f"{self._member.name} does not answer TIMESYNC: its link's delay is not known"
+        return (silent,) * (not self._answers) + tuple(
             f"{self._member.name} sends {r.message.name} at {rates[int(r.message)]:.1f} Hz "
             f"instead of {r.hz:g}"
             for r in self._slow()

@@ -1,8 +1,10 @@
 """What has been received: per-vehicle history, and the fleet on a common time base."""
 
+import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +16,10 @@ Array = NDArray[np.float64]
 
 MAX_AGE_S = 0.35  # older than this a sample is not carried forward to a frame
 HISTORY = 64
+ROUND_TRIPS = 20
+MIDDLE_80 = 2.563  # standard deviations wide
 LOSS_WINDOW_S = 5.0
+MISSED, SPREAD = 0.01, 3.0  # when an order is surely obeyed: copies all lost; standard deviations
 
 
 @dataclass(frozen=True)
@@ -53,9 +58,16 @@ class Frame:
     velocity_mps: Array  # [V, 2]
     yaw_rad: Array  # [V]
     fresh: NDArray[np.bool_]  # [V]
+    came: NDArray[np.bool_]  # [V] whether the report of this very time has come
     loss: Array  # [V] share of reports that got lost lately
-    delay_s: Array  # [V] from here until orders that answer it take effect
+    delay_s: Array  # [V] from here until orders that answer it take effect, usually
+    jitter_s: Array  # [V] standard deviation of that
     driven: NDArray[np.bool_]  # [V] since the frame before it was in a mode that takes set-points
+
+    @property
+    def all_stand(self) -> bool:
+        """Everybody is heard and in HOLD: told to, and known to have done so."""
+        return bool(self.fresh.all() and not self.driven.any())
 
 
 class Track:
@@ -65,7 +77,7 @@ class Track:
         self.status = Status()
         self.samples: deque[Sample] = deque(maxlen=HISTORY)
         self.last_heard_wall_s = float("-inf")
-        self.round_trip_s = 0.0
+        self._round_trips_s: deque[float] = deque(maxlen=ROUND_TRIPS)
         self._modes: deque[tuple[float, int]] = deque(maxlen=HISTORY)
 
     def said(self, status: Status) -> None:
@@ -78,6 +90,30 @@ class Track:
         """The mode it was in after the sample of `time_s`."""
         known = [mode for since_s, mode in self._modes if since_s <= time_s + 1e-3]
         return known[-1] if known else self.status.mode
+
+    def answered(self, round_trip_s: float) -> None:
+        """A question took so long, in fleet time: from a report until what answers it is there."""
+        if math.isfinite(round_trip_s):
+            self._round_trips_s.append(max(0.0, round_trip_s))
+
+    @property
+    def round_trip_s(self) -> float:
+        """Its median; 0 while nothing is known."""
+        return median(self._round_trips_s) if self._round_trips_s else 0.0
+
+    @property
+    def jitter_s(self) -> float:
+        """Its standard deviation, from the middle 80 %: a single outlier is no link."""
+        if not self._round_trips_s:
+            return 0.0
+        low_s, high_s = np.quantile(self._round_trips_s, (0.1, 0.9))
+        return float(high_s - low_s) / MIDDLE_80
+
+    def obeyed_within_s(self, time_s: float, period_s: float) -> float:
+        """How long it takes, from a report, until what answers it each period is surely obeyed."""
+        loss = min(self.loss(time_s, period_s), 0.9)
+        copies = math.log(MISSED) / math.log(loss) - 1.0 if loss > MISSED else 0.0
+        return self.round_trip_s + SPREAD * self.jitter_s + copies * period_s
 
     def position(self, sample: Sample) -> None:
         if not self.samples or sample.time_s > self.samples[-1].time_s:
@@ -98,6 +134,10 @@ class Track:
                     ),
                 )
         return None
+
+    def has(self, time_s: float, within_s: float) -> bool:
+        """Whether there is a sample of about that time."""
+        return any(abs(sample.time_s - time_s) <= within_s for sample in reversed(self.samples))
 
     def loss(self, time_s: float, period_s: float) -> float:
         """Share of the reports of the last LOSS_WINDOW_S before `time_s` that are missing."""
@@ -140,10 +180,13 @@ def frame_at(
     tracks: list[Track],
     time_s: float,
     period_s: float,
-    delays_s: Sequence[float],
+    newest_s: float,
     driven: Sequence[bool],
 ) -> Frame:
-    """The whole fleet at `time_s`, each vehicle from its newest sample by then."""
+    """The whole fleet at `time_s`, each vehicle from its newest sample by then.
+
+    `newest_s`: what has come by now; orders that answer this frame are sent no earlier.
+    """
     rows = [t.at(time_s) for t in tracks]
     nan2 = (float("nan"), float("nan"))
     return Frame(
@@ -152,7 +195,9 @@ def frame_at(
         np.array([r.velocity_mps if r else nan2 for r in rows]),
         np.array([t.status.yaw_rad for t in tracks]),
         np.array([r is not None for r in rows]),
+        np.array([t.has(time_s, period_s / 2) for t in tracks]),
         np.array([t.loss(time_s, period_s) for t in tracks]),
-        np.array(delays_s),
+        np.array([newest_s - time_s + t.round_trip_s for t in tracks]),
+        np.array([t.jitter_s for t in tracks]),
         np.array(driven),
     )

@@ -23,6 +23,9 @@ MOMENTS_PER_TICK = 4  # of the memory, each about 2 ms: a step must not take 10 
 def settle(desk: Desk, phase: Settling, frame: Frame) -> Orders:
     """[0b] At rest: replay the memory under every hypothesis; decide, or ask for plan alpha."""
     caught_up = phase.hindsight.take(tuple(desk.watch.memory), MOMENTS_PER_TICK)
+    if not frame.all_stand:
+        desk.phase = replace(phase, since_s=frame.time_s)
+        return desk.hold()
     if frame.time_s - phase.since_s < execution.REST_S or not caught_up:
         return desk.hold()
     opened = phase.hindsight.doubt()
@@ -123,7 +126,9 @@ def experiment(desk: Desk, phase: Experimenting, frame: Frame) -> Orders:
 
 def conclude(desk: Desk, phase: Concluding, frame: Frame) -> Orders:
     """[2] At rest: the verdict, or another plan from where each twin stands now."""
-    if frame.time_s - phase.since_s >= execution.REST_S:
+    if not frame.all_stand:
+        desk.phase = replace(phase, since_s=frame.time_s)
+    elif frame.time_s - phase.since_s >= execution.REST_S:
         named = desk.open_doubt.verdict(desk.view.diagnosis.decide_at).decided
         desk.doubt = doubts.anchor(desk.open_doubt, desk.mean_report_m())
         _escalate(desk, named)

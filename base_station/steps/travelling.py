@@ -110,7 +110,9 @@ def go_home(desk: Desk, phase: Returning, frame: Frame) -> Orders:
         desk.phase = replace(phase, still_since_s=None)
         position = desk.watch.state[:, twin.NORTH : twin.EAST + 1]
         return execution.return_orders(position, desk.goals.position_m, ~away, desk.view)
-    still_since_s = frame.time_s if phase.still_since_s is None else phase.still_since_s
+    still_since_s = phase.still_since_s
+    if still_since_s is None or not frame.all_stand:
+        still_since_s = frame.time_s
     desk.phase = replace(phase, still_since_s=still_since_s)
     if frame.time_s - still_since_s >= execution.REST_S:
         if desk.goals.there(desk.watch.state).all():

@@ -1,7 +1,7 @@
 """How far the world may go before the station has caught up (pure)."""
 
 LEASH_S = 0.5  # ahead of the station's last tick
-FIRST_LEASH_S = 3.0  # before the station has ticked at all
+FIRST_LEASH_S = 1.0  # before the station has ticked at all; then at a pace that it can follow
 BOOT_S, BOOT_SPEED = 180.0, 4.0  # a foreign firmware and its EKF take a minute of world time
 
 
@@ -12,13 +12,14 @@ class Leash:
     the processor more, and nobody waits for the world.
     """
 
-    def __init__(self, speed: float, boots: bool = False) -> None:
+    def __init__(self, speed: float) -> None:
         self.until_s = 0.0
         self._pace = speed or 1.0
-        self._boots, self._boot_pace = boots, speed or BOOT_SPEED
+        self._boot_pace = speed or BOOT_SPEED
         self._began_s: float | None = None
         self._learning: tuple[float, float] | None = None  # wall and world time of its beginning
         self._absent: tuple[float, float] | None = None  # the same of its being away
+        self._tick_s: float | None = None  # the last before that
 
     def go_on(self, now_s: float) -> bool:
         """The station is being started again: no world waits for that. Whether it is longer now."""
@@ -28,8 +29,14 @@ class Leash:
         return self.until_s > before_s
 
     def lengthen(self, tick_s: float | None, learning: bool, now_s: float) -> bool:
-        """Take the station's last tick; whether the leash is longer now."""
-        self._absent = None
+        """Take the station's last tick; whether the leash is longer now.
+
+        A station that was away has missed what was sent meanwhile: before it ticks again, time
+        goes on as if it still were.
+        """
+        if self._absent is not None and tick_s == self._tick_s:
+            return self.go_on(now_s)
+        self._absent, self._tick_s = None, tick_s
         until_s = self._first_s(now_s) if tick_s is None else tick_s + LEASH_S
         if not learning:
             self._learning = None
@@ -42,9 +49,7 @@ class Leash:
         return longer
 
     def _first_s(self, now_s: float) -> float:
-        """Before the first tick; who boots gets time at a pace that a station can follow."""
-        if not self._boots:
-            return FIRST_LEASH_S
+        """Before the first tick: links are measured, and firmwares boot."""
         if self._began_s is None:
             self._began_s = now_s
         return min(BOOT_S, FIRST_LEASH_S + (now_s - self._began_s) * self._boot_pace)

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from hil.bench.firmware import is_foreign, start_of
+from hil.bench.firmware import start_of
 from hil.bench.folders import SCENARIO_FILE, VIEW_FILE, Folders
 from hil.bench.injector import Breaker
 from hil.bench.leash import Leash
@@ -83,7 +83,7 @@ class _Run:
             _signing(options.signing_key),
         )
         self._injector_links: dict[int, UdpLink] = {}
-        self._leash = Leash(options.speed, boots=any(map(is_foreign, scenario.fleet)))
+        self._leash = Leash(options.speed)
 
     def go(self) -> None:
         with ExitStack() as stack:

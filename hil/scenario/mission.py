@@ -19,10 +19,14 @@ class Priors(Model):
 
 
 class Diagnosis(Model):
+    """`obeyed_within_s`: how long an order may take until it is surely obeyed (round trip, its
+    spread, and what gets lost); by a slower link nothing is judged, and nobody is driven."""
+
     evidence: Literal["position"] = "position"
     decide_at: Annotated[float, Field(gt=0.5, lt=1)] = 0.99
     plan_error: Annotated[float, Field(gt=0, lt=0.5)] = 0.01
     false_alarms_per_hour: Positive = 0.1
+    obeyed_within_s: Positive = 0.85
     tries: Annotated[int, Field(ge=1, le=20)] = 3
     priors: Priors = Priors()
 

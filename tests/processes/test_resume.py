@@ -16,10 +16,6 @@ RESUMED = "--resume . "
 MOMENTS = ("tiny displacements", "drive plan alpha", "drive plan beta")
 
 
-@pytest.mark.xfail(
-    strict=False,
-    reason="as fast as possible, orders take longer than the twins allow for: false alarms (open)",
-)
 @pytest.mark.timeout(600)
 def test_a_station_killed_in_three_phases_brings_the_mission_to_its_end(tmp_path: Path) -> None:
     out = tmp_path / "out"

@@ -3,10 +3,10 @@
 import pytest
 
 from base_station.autopilots import adapter
-from base_station.commands import AskRate, RequestMessage, SetParameter
+from base_station.commands import AskRate, AskTime, RequestMessage, SetParameter
 from base_station.receiving.fleet import Fleet
 from base_station.receiving.local_origin import PAIRS, LocalOrigin
-from base_station.receiving.preparing import SETTLED_S, Preparation
+from base_station.receiving.preparing import ANSWERS, SETTLED_S, Preparation
 from hil.frames import Origin, ned_to_wgs84
 from hil.mavlink import (
     COMPONENT_AUTOPILOT,
@@ -22,6 +22,7 @@ from hil.mavlink import (
     ParamValue,
     Received,
     ServoOutputs,
+    Timesync,
 )
 from hil.scenario import StationView
 
@@ -129,8 +130,24 @@ def test_the_origin_is_requested_until_it_is_known(rescue_view: StationView) -> 
     assert not any(isinstance(c, RequestMessage) for c in preparation.asks(1.0))
 
 
-def test_our_own_vehicles_need_nothing(rescue_view: StationView) -> None:
+def test_our_own_vehicles_need_but_tell_the_time(rescue_view: StationView) -> None:
     member = rescue_view.fleet[0]
     preparation = Preparation(member, adapter("testbed", member.frame), 10.0, 250)
+    for k in range(ANSWERS):
+        assert not preparation.done
+        asked_s = 0.5 * k
+        assert preparation.asks(asked_s) == [AskTime(member.sysid, round(asked_s * 1e9))]
+        preparation.hear(Timesync(1_000_000_000, round(asked_s * 1e9)))
     assert preparation.done
-    assert preparation.asks(0.0) == []
+    assert preparation.asks(0.5 * ANSWERS) == []
+
+
+def test_who_does_not_tell_the_time_is_complained_of_and_driven(rescue_view: StationView) -> None:
+    member = rescue_view.fleet[0]
+    preparation = Preparation(member, adapter("testbed", member.frame), 10.0, 250)
+    for time_s in (0.0, SETTLED_S):
+        preparation.hear(local(time_s))
+    assert preparation.done
+    assert preparation.warnings() == (
+        "rover_1 does not answer TIMESYNC: its link's delay is not known",
+    )

@@ -56,7 +56,8 @@ class Plant:
             report[SUSPECT] = self._falsified(since_s)
         noisy = report + 0.015 * self.rng.standard_normal(report.shape)
         still, none, fresh = np.zeros((3, 2)), np.zeros(3), np.ones(3, dtype=np.bool_)
-        return Frame(self.time_s, noisy, still, none, fresh, none, none, orders.driven)
+        link = none, none, none
+        return Frame(self.time_s, noisy, still, none, fresh, fresh, *link, orders.driven)
 
     def _falsified(self, since_s: float) -> NDArray[np.float64]:
         late = round(float(self.reports.lag_s[0]) / PERIOD_S)

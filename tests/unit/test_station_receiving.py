@@ -131,3 +131,30 @@ def test_silence_does_not_count_while_the_station_itself_is_not_running(
         assert station.step(100.0 + k / 2, ()).events == ()
     texts = [e.text for e in station.step(100.0 + LINK_LOST_WALL_S + 0.1, ()).events]
     assert texts[0] == "no word from rover_1, rover_2, rover_3 for 5 s"
+
+
+@pytest.mark.parametrize("pace", [1.0, 20.0])
+def test_the_round_trip_is_told_in_fleet_time_whatever_its_pace(
+    rescue_view: StationView, pace: float
+) -> None:
+    """From the newest report that was known when TIMESYNC was asked until the vehicle got it."""
+    fleet = Fleet(rescue_view)
+
+    def hear(index: int, value: object, wall_s: float) -> None:
+        sysid = rescue_view.fleet[index].sysid
+        fleet.receive(index, Received(sysid, COMPONENT_AUTOPILOT, value), wall_s)
+
+    one_way_s = 0.15
+    for k in range(1, 40):
+        sent_s = 0.1 * k
+        heard_wall_s = (sent_s + one_way_s) / pace
+        for index in range(3):
+            hear(index, _position(sent_s, 0.0), heard_wall_s)
+        got_s, asked_ns = sent_s + 2 * one_way_s, round(heard_wall_s * 1e9)
+        answer = Timesync(round(got_s * 1e9), asked_ns)
+        hear(0, answer, (got_s + one_way_s) / pace)
+    assert fleet.tracks[0].round_trip_s == pytest.approx(2 * one_way_s, abs=1e-3)
+    assert fleet.tracks[0].jitter_s == pytest.approx(0.0, abs=1e-3)
+    assert fleet.tracks[1].round_trip_s == 0.0
+    late = fleet.due()[-1]
+    assert late.delay_s[0] == pytest.approx(fleet.newest_s - late.time_s + 0.3, abs=1e-3)

@@ -1,0 +1,40 @@
+"""How far the world may go before the station has caught up."""
+
+import pytest
+
+from hil.bench.leash import BOOT_SPEED, FIRST_LEASH_S, LEASH_S, Leash
+
+
+def test_before_the_first_tick_time_passes_as_fast_as_a_station_can_follow() -> None:
+    leash = Leash(speed=0.0)
+    leash.lengthen(None, False, now_s=100.0)
+    assert leash.until_s == pytest.approx(FIRST_LEASH_S)
+    leash.lengthen(None, False, now_s=102.0)
+    assert leash.until_s == pytest.approx(FIRST_LEASH_S + 2.0 * BOOT_SPEED)
+
+
+def test_the_world_is_a_little_ahead_of_the_last_tick() -> None:
+    leash = Leash(speed=0.0)
+    assert leash.lengthen(7.0, False, now_s=0.0)
+    assert leash.until_s == 7.0 + LEASH_S
+    assert not leash.lengthen(7.0, False, now_s=9.0)
+
+
+def test_a_station_that_has_come_back_is_told_what_it_needs_for_its_next_tick() -> None:
+    """It has missed all reports up to the end of the leash: if the world stood, both would wait."""
+    leash = Leash(speed=2.0)
+    leash.lengthen(7.0, False, now_s=0.0)
+    leash.go_on(now_s=1.0)
+    leash.go_on(now_s=2.0)
+    assert leash.until_s == pytest.approx(7.0 + LEASH_S + 2.0)
+    assert leash.lengthen(7.0, False, now_s=3.0)
+    assert leash.until_s == pytest.approx(7.0 + LEASH_S + 4.0)
+    assert leash.lengthen(12.0, False, now_s=4.0)
+    assert leash.until_s == 12.0 + LEASH_S
+
+
+def test_while_the_station_learns_time_passes_as_it_does_outside() -> None:
+    leash = Leash(speed=0.0)
+    leash.lengthen(7.0, True, now_s=0.0)
+    leash.lengthen(9.0, True, now_s=0.5)
+    assert leash.until_s == pytest.approx(7.0 + LEASH_S + 0.5)
