@@ -51,6 +51,7 @@ class Vehicle(Model):
     sysid: SysId
     airframe: AirframeName = "omni_plus"
     autopilot: AutopilotName = "testbed"
+    physics: Literal["json", "hil"] = "json"  # hil: a board in HIL mode, started by hand
     start: Point
     start_yaw_deg: Finite = 0.0
     goal: Point

@@ -15,7 +15,6 @@ from typing import TextIO
 
 from hil.errors import InputError, ProcessDiedError
 from hil.link import PHYSICS_PORT_BASE, UdpLink, is_here
-from hil.physics_link import decode_frame
 from hil.scenario import Scenario
 from hil.world.orders import OrderReader, Until
 from hil.world.pacing import Leash, Pace
@@ -45,13 +44,13 @@ def run_world(scenario: Scenario, options: WorldOptions) -> int:
     names = {v.sysid: f"{v.name} (sysid {v.sysid}, port {ports[v.sysid]})" for v in scenario.fleet}
     with ExitStack() as stack:
         links = {sysid: _bind(stack, host, port) for sysid, port in ports.items()}
-        for link in links.values():
-            link.guard(lambda datagram: decode_frame(datagram) is not None)
         if not is_here(host):
             print(f"listens to other machines, too: {host}", file=sys.stderr, flush=True)
         file = stack.enter_context(_open_truth(options.truth))
         leash = Leash(0.0) if options.leash else None
         simulation, pace = Simulation(scenario, scenario.seed), Pace(options.speed)
+        for sysid, link in links.items():
+            link.guard(simulation.wires[sysid].is_welcome)
         _Server(simulation, links, names, partial(_write_truth, file), pace, leash).serve()
     return 0
 

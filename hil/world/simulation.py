@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hil.faults import to_clearing, to_injection
-from hil.physics_link import decode_frame, encode_state
 from hil.scenario import Scenario
 from hil.world.lockstep import Lockstep
 from hil.world.orders import Break, Mend
@@ -13,6 +12,7 @@ from hil.world.powering import Powering
 from hil.world.space import World
 from hil.world.tampering import Tampering
 from hil.world.truth import ContactEpisode, ContactLog, TruthRecord
+from hil.world.wires import wire_of
 
 TRUTH_HZ = 10
 
@@ -35,6 +35,7 @@ class Simulation:
         self.world = World(scenario, seed)
         self.lockstep = Lockstep(tuple(v.sysid for v in scenario.fleet), scenario.clock.physics_hz)
         self._tampering = {v.sysid: Tampering(v.frame) for v in scenario.fleet}
+        self.wires = {v.sysid: wire_of(v, scenario) for v in scenario.fleet}
         self._powering = Powering(scenario.fleet)
         self._contact_log = ContactLog()
         self._samples = 0  # truth records made so far
@@ -45,11 +46,10 @@ class Simulation:
 
     def receive(self, sysid: int, datagrams: Sequence[bytes], now_s: float) -> tuple[Reply, ...]:
         """Take what a vehicle sent; returns cached replies that have to go out again."""
-        frames = (decode_frame(d) for d in datagrams)
         again = [
             self.lockstep.receive(sysid, frame, self.world.steps, now_s)
-            for frame in frames
-            if frame is not None
+            for datagram in datagrams
+            for frame in self.wires[sysid].frames(datagram)
         ]
         return tuple((sysid, reply) for reply in again if reply is not None)
 
@@ -94,7 +94,8 @@ class Simulation:
     def _answer(self, now_s: float) -> tuple[Reply, ...]:
         replies = []
         for sysid in self.lockstep.answers_due(self.world.steps):
-            reply = encode_state(self._tampering[sysid].told(self.world.state(sysid)))
+            told = self._tampering[sysid].told(self.world.state(sysid))
+            reply = self.wires[sysid].reply(told)
             self.lockstep.answered(sysid, reply, now_s)
             replies.append((sysid, reply))
         return tuple(replies)
