@@ -144,6 +144,13 @@ def awake(doubt: Doubt) -> Doubt:
     return replace(doubt, prior=weights + doubt.prior - doubt.log_weights)
 
 
+def halved(doubt: Doubt) -> Doubt:
+    """Half the evidence so far, as log weights: that of ordinary driving by a troubled link, where
+    errors of one cause were counted as many."""
+    weights = 0.5 * np.log(doubt.posterior + 1e-300)
+    return replace(doubt, prior=weights + doubt.prior - doubt.log_weights)
+
+
 def narrowed(doubt: Doubt, keep: Sequence[int]) -> tuple[tuple[Hypothesis, ...], Array, Array]:
     """The twins `keep` (indices): hypotheses, renormalised posterior [K] and states [K, V, S]."""
     p = doubt.posterior[list(keep)]

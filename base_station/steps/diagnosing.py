@@ -4,7 +4,7 @@ from dataclasses import asdict, replace
 
 from base_station import execution
 from base_station.belief import doubt as doubts
-from base_station.belief import escalation
+from base_station.belief import escalation, hearing
 from base_station.belief.diagnosis import Verdict
 from base_station.belief.hypotheses import NONE, UNKNOWN
 from base_station.belief.watch import Watch
@@ -29,6 +29,8 @@ def settle(desk: Desk, phase: Settling, frame: Frame) -> Orders:
     if frame.time_s - phase.since_s < execution.REST_S or not caught_up:
         return desk.hold()
     opened = phase.hindsight.doubt()
+    if hearing.trouble(frame, desk.fleet.period_s).any():
+        opened = doubts.halved(opened)
     member = desk.view.fleet[opened.suspect]
     desk.doubt = doubts.anchor(opened, desk.mean_report_m())
     posterior = opened.verdict(desk.view.diagnosis.decide_at).posterior
