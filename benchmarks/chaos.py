@@ -3,8 +3,8 @@
     python benchmarks/chaos.py [--runs 300] [--udp 0] [--out runs/chaos.jsonl] [--learn] [--table]
 
 Cells of the matrix come in a shuffled order that is always the same, run k has seed k, and each
-result is a line of JSON, so that a run that was stopped goes on. In memory the experiment is found
-by `cem`; the mission is learnt once for each verdict on a perfect radio and used again (--learn: in
+result is a line of JSON, so that a run that was stopped goes on. In memory the experiment is found by
+`cem`; a mission is learnt once for each belief and place (to a metre) and used again (--learn: in
 every run). Then a table in Markdown. Exit code 1 when something happened that must not: a wrong
 verdict with a posterior of 0.99 or more, a false alarm, a set-point executed for more than 3 s.
 """
@@ -23,6 +23,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from base_station import twin
 from base_station.listeners import Silent
 from base_station.planning.planner import plan
 from base_station.planning.requests import PlanProgress, PlanReady, PlanRequest
@@ -206,7 +207,7 @@ def struck(scenario: Scenario, rig: Rig) -> Iterator[None]:
 
 
 class Cached:
-    """Missions learnt once for each belief."""
+    """Missions learnt once for each belief and place: one learnt elsewhere would go astray."""
 
     def __init__(self) -> None:
         self._known: dict[str, PlanReady] = {}
@@ -216,7 +217,8 @@ class Cached:
     ) -> PlanReady:
         if request.kind == "alpha":
             return plan(view, request, tell)
-        name = "+".join(f"{h.sysid} {h.name}" for h in request.hypotheses)
+        place = request.states[0, :, twin.NORTH : twin.EAST + 1].round().tolist()
+        name = "+".join(f"{h.sysid} {h.name}" for h in request.hypotheses) + str(place)
         if name not in self._known:
             self._known[name] = plan(view, request, tell)
         return replace(self._known[name], number=request.number)

@@ -22,7 +22,7 @@ Flags = NDArray[np.bool_]
 
 REMEMBERED = 20  # orders: a link that is slower is as good as lost
 AT_ONCE_S = 1e-3  # rounding
-BAD_LOSS = 0.1
+BAD_LOSS, WORST = 0.1, 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +81,11 @@ def heard(hearing: Hearing, orders: Orders, frame: Frame, period_s: float) -> He
 
 
 def trouble(frame: Frame, period_s: float) -> Array:
-    """[V] 0 to 1: how much of what a link might do to orders there is to reckon with."""
-    return np.clip(np.maximum(frame.loss / BAD_LOSS, frame.jitter_s / period_s), 0.0, 1.0)
+    """[V] 0 to WORST: how much of what a link might do to orders there is to reckon with.
+
+    Where many orders get lost, several in a row do, too.
+    """
+    return np.clip(np.maximum(frame.loss / BAD_LOSS, frame.jitter_s / period_s), 0.0, WORST)
 
 
 def _sent(orders: Orders, answered: Frame) -> Sent:
