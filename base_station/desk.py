@@ -93,7 +93,7 @@ class Desk:
             hypotheses=hypotheses,
             posterior=posterior,
             states=states,
-            delivered=self.goals.delivered,
+            delivered=self.goals.settled,
         )
         return self._requests
 

@@ -7,12 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from base_station import twin
-from base_station.belief.escalation import PUSH, remedy
+from base_station.autopilots import adapter
+from base_station.belief.escalation import PUSH, RECKON, remedy
 from base_station.belief.hypotheses import Hypothesis, nominal
 from base_station.belief.watch import Watch
 from base_station.execution import Orders
 from base_station.planning.policy import Commands, act, arrived, beta_observation, to_setpoints
-from base_station.planning.requests import PolicyWeights
+from base_station.planning.requests import Policy, Script
+from base_station.planning.scripted.nose_first import Scene, nose_first, without_drive
 from hil.scenario import StationView
 
 Array = NDArray[np.float64]
@@ -31,6 +33,12 @@ class Goals:
     radius_m: float
     delivered: tuple[bool, ...]
     times_s: tuple[float, ...]
+    left: tuple[int, ...] = ()  # indices of those that are left where they are
+
+    @property
+    def settled(self) -> tuple[bool, ...]:
+        """Who is delivered, or won't be."""
+        return tuple(d or v in self.left for v, d in enumerate(self.delivered))
 
     @classmethod
     def of(cls, view: StationView) -> Self:
@@ -47,7 +55,10 @@ class Goals:
     def newly_reached(self, watch: Watch) -> list[int]:
         """Vehicles that deliver now, by the rule that the plan was learnt with."""
         at_goal = arrived(watch.state[None], self.position_m, self.radius_m, broken(watch))[0]
-        return [v for v in np.flatnonzero(at_goal).tolist() if not self.delivered[v]]
+        return [v for v in np.flatnonzero(at_goal).tolist() if not self.settled[v]]
+
+    def leaving(self, vehicle: int) -> Self:
+        return replace(self, left=(*self.left, vehicle))
 
     def with_delivered(self, vehicle: int, time_s: float) -> Self:
         delivered, times_s = list(self.delivered), list(self.times_s)
@@ -96,8 +107,15 @@ def can_drive(watch: Watch, view: StationView) -> Flags:
     return able
 
 
+def must_be_left(hypothesis: Hypothesis, view: StationView) -> bool:
+    """Whether the vehicle can neither be driven (its autopilot needs a fix) nor needs a push."""
+    member = next(m for m in view.fleet if m.sysid == hypothesis.sysid)
+    reckons = remedy(hypothesis).startswith(RECKON)
+    return reckons and not adapter(member.autopilot, member.frame).drives_without_fix
+
+
 def orders(
-    policy: PolicyWeights,
+    policy: Policy,
     watch: Watch,
     goals: Goals,
     elapsed_s: float,
@@ -110,9 +128,11 @@ def orders(
     `shake` is the sigma of noise on its action, of the kind it explored with: the mean of a policy
     can be stuck where its samples are not.
     """
+    if isinstance(policy, Script):
+        return by_rule(watch, goals, view)
     observation = beta_observation(
         watch.state[None],
-        np.array([goals.delivered]),
+        np.array([goals.settled]),
         np.array([min(1.0, elapsed_s / view.planning.beta_horizon_s)]),
         watch.baseline.model,
         goals.position_m,
@@ -121,4 +141,20 @@ def orders(
     action = act(policy, observation)
     action = action + shake * rng.standard_normal(action.shape)
     setpoints = to_setpoints(action, Commands.of_view(view))[0]
-    return Orders(setpoints, np.ones(len(view.fleet), dtype=np.bool_))
+    driven = np.ones(len(view.fleet), dtype=np.bool_)
+    driven[list(goals.left)] = False
+    return Orders(setpoints, driven)
+
+
+def by_rule(watch: Watch, goals: Goals, view: StationView) -> Orders:
+    """What the rule for vehicles that turn before they drive wants; who has no drive rolls."""
+    model, lost = watch.baseline.model, broken(watch)
+    helpless = without_drive(model, watch.baseline.faults(belief_of(watch, view)), lost)
+    commands = Commands.of_view(view)
+    scene = Scene(model, goals.position_m, commands, goals.radius_m, lost, helpless)
+    delivered = np.array([goals.settled])
+    setpoints = to_setpoints(nose_first(scene, watch.state[None], delivered), commands)[0]
+    driven = ~delivered[0] | (np.abs(setpoints[:, :2]).max(axis=1) > 0.0)
+    if lost is not None and helpless:
+        driven[lost] = False
+    return Orders(setpoints, driven)

@@ -77,7 +77,7 @@ def _goal(desk: Desk, v: int) -> dict[str, Any]:
 
 
 def _declared(desk: Desk, v: int) -> str:
-    if not desk.watching or not desk.goals.there(desk.watch.state)[v]:
+    if not desk.watching or v in desk.goals.left or not desk.goals.there(desk.watch.state)[v]:
         return "unreached"
     return "uncertain" if _drift_sigma_m(desk, v) > UNCERTAIN_SIGMA_M else "reached"
 

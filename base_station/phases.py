@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from base_station.belief.hindsight import Hindsight
 from base_station.execution import Orders
-from base_station.planning.requests import OpenLoopPlan, PolicyWeights
+from base_station.planning.requests import OpenLoopPlan, Policy
 from base_station.records import Phase
 
 Array = NDArray[np.float64]
@@ -86,7 +86,7 @@ class OnMission:
     `stalls` counts how often nobody did, `shaken_until_s` is until when that is answered by noise.
     """
 
-    policy: PolicyWeights
+    policy: Policy
     since_s: float
     clock_s: float
     orders: Orders

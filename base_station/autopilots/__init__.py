@@ -2,6 +2,7 @@
 
 from base_station.autopilots.adapter import Autopilot, Rate, Setting
 from base_station.autopilots.ardupilot import ArduPilot
+from base_station.autopilots.heading import HeadingFirst
 from base_station.autopilots.px4 import Px4
 from base_station.autopilots.testbed import Testbed
 from hil.airframe import Airframe
@@ -10,7 +11,7 @@ from hil.errors import InputError
 _KNOWN: tuple[type[Autopilot], ...] = (Testbed, ArduPilot, Px4)
 NAMES = tuple(kind.NAME for kind in _KNOWN)
 
-__all__ = ["NAMES", "Autopilot", "Rate", "Setting", "adapter"]
+__all__ = ["NAMES", "Autopilot", "HeadingFirst", "Rate", "Setting", "adapter"]
 
 
 def adapter(name: str, frame: Airframe) -> Autopilot:

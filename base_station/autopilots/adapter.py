@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
+from base_station.autopilots.heading import HeadingFirst
 from base_station.receiving.telemetry import Status
 from hil.airframe import Airframe
 from hil.mavlink import CommandLong, Encoder, MessageId, ParamValue
@@ -32,6 +33,8 @@ class Autopilot(ABC):
     has_own_origin: ClassVar[bool] = True  # local NED begins somewhere of the vehicle's own
     needs_setpoints_first: ClassVar[bool] = False  # the driven mode is refused without a stream
     response: ClassVar[str] = "first_order"  # how speed follows a set-point, for `hil identify`
+    drives_without_fix: ClassVar[bool] = True  # to a velocity, when its receiver is stuck
+    latency_s: ClassVar[float] = 0.0  # of its own, from a set-point to what it does about it
     estimate_lags: ClassVar[bool] = False  # no accelerometer in it: raw fixes are truer
     setpoint_timeout_s: ClassVar[float] = 3.0  # it stops by itself after the last set-point
 
@@ -39,9 +42,13 @@ class Autopilot(ABC):
         self._frame = frame
 
     @property
+    def helm(self) -> HeadingFirst | None:
+        """How it drives when it turns its nose to where it is sent, whatever its frame could do."""
+        return None
+
+    @property
     def heading_first(self) -> bool:
-        """Whether it turns its nose to where it is sent, whatever its frame could do."""
-        return False
+        return self.helm is not None
 
     @property
     @abstractmethod
@@ -56,6 +63,11 @@ class Autopilot(ABC):
     @abstractmethod
     def ready(self, status: Status) -> bool:
         """Whether it says that it may be armed and knows where it is."""
+
+    def lost(self, status: Status) -> bool:
+        """Whether it says that it does not know where it is any more."""
+        del status
+        return False
 
     def set_mode(self, encoder: Encoder, sysid: int, mode: int) -> bytes:
         """MAV_CMD_DO_SET_MODE with `mode` as a heartbeat would carry it."""

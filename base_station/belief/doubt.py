@@ -5,7 +5,7 @@ are seen, and never drawn towards the suspect's own reports: those are what is b
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from base_station import twin
 from base_station.belief import diagnosis, hearing, observer, particles
 from base_station.belief.diagnosis import Fit, ReportFaults, Verdict
+from base_station.belief.fixes import Fixes
 from base_station.belief.hearing import Hearing
 from base_station.belief.hypotheses import Hypothesis
 from base_station.belief.particles import DRAWS, Particles
@@ -47,6 +48,7 @@ class Doubt:
     unknown: float
     last_report_m: Array
     judged_s: float
+    fixes: Fixes = field(default_factory=Fixes.none)
 
     @property
     def twins(self) -> tuple[Hypothesis, ...]:
@@ -57,7 +59,8 @@ class Doubt:
         """[H], not normalised: the evidence of a twin is the mean over its draws."""
         evidence = _log_mean_exp(self.fit.log_likelihood.reshape(DRAWS, -1))
         beyond = [self.unknown] * (len(self.hypotheses) - len(self.twins))
-        return np.asarray(self.prior + np.array([*evidence, *beyond]))
+        said = self.fixes.log_likelihood(self.hypotheses)
+        return np.asarray(self.prior + np.array([*evidence, *beyond]) + said)
 
     @property
     def posterior(self) -> Array:
@@ -134,6 +137,7 @@ def anchor(doubt: Doubt, report_m: Array) -> Doubt:
         fit=diagnosis.carried_over(doubt.fit, rows, moved_off),
         unknown=0.0,
         last_report_m=report_m[doubt.suspect],
+        fixes=Fixes.none(),
     )
 
 
@@ -177,6 +181,9 @@ def advanced(
     now_m, before_m = trail_m[-1 - age, rows], trail_m[-2 - age, rows]
     across_m = _across(doubt.states, states, suspect) * (motion.gps_stuck[:, suspect] < 0.5)
     fit = replace(doubt.fit, path_m=doubt.fit.path_m + np.abs(now_m - before_m) + across_m)
+    if frame.fix_m is not None and frame.lost is not None:
+        place_m, fix_m = frame.position_m[suspect], frame.fix_m[suspect]
+        doubt = replace(doubt, fixes=doubt.fixes.noted(place_m, fix_m, bool(frame.lost[suspect])))
     since_s = frame.time_s - doubt.judged_s
     if since_s < diagnosis.SAMPLE_PERIOD_S - 1e-6 or not frame.fresh[suspect]:
         return replace(doubt, states=states, trail_m=trail_m, hearing=heard, fit=fit)

@@ -22,7 +22,8 @@ Array = NDArray[np.float64]
 PLAUSIBLE = 0.005  # explanations less likely than this are not worth an experiment
 APART_M = 0.15  # reports that differ by this are told apart: five sigma
 PULSE_S, REST_S = 1.0, 1.0  # at full speed: what a weak motor does at walking pace is friction's
-PUSH = "push"
+TURNING_PULSE_S = 1.5  # of who turns before it gets anywhere
+PUSH, RECKON = "push", "reckon"
 WEAK = 0.5  # a motor with less than this of its force is no use
 
 
@@ -35,8 +36,8 @@ def remedy(hypothesis: Hypothesis) -> str:
         weak = fault.type is not Type.PARTIAL or fault.size[0] < WEAK
         return f"{PUSH} {fault.instances}" if weak else "drive"
     if fault.type is Type.STUCK:
-        return f"reckon {fault.axes}"
-    return "reckon" if fault.type is Type.DRIFT else "filter"
+        return f"{RECKON} {fault.axes}"
+    return RECKON if fault.type is Type.DRIFT else "filter"
 
 
 def remedy_posterior(doubt: Doubt) -> float:
@@ -102,7 +103,9 @@ def _solo_setpoints(doubt: Doubt, view: StationView) -> Array:
     state = doubt.of_twins()[0][int(np.argmax(doubt.posterior[: len(doubt.twins)]))]
     here_m, yaw = state[doubt.suspect, : twin.EAST + 1], float(state[doubt.suspect, twin.YAW])
     period_s = 1.0 / view.clock.control_hz
-    drive, rest = (max(1, round(s / period_s)) for s in (PULSE_S, REST_S))
+    turns_first = bool(doubt.baseline.model.vehicles.heading_first[doubt.suspect])
+    pulse_s = TURNING_PULSE_S if turns_first else PULSE_S
+    drive, rest = (max(1, round(s / period_s)) for s in (pulse_s, REST_S))
     setpoints = np.zeros((4 * (drive + rest), len(view.fleet), 3))
     setpoints[..., 2] = np.nan
     row = 0

@@ -5,7 +5,7 @@ and the size of the fault. Rows [R = K x T], the twins running fastest, so that 
 draws as far as they can: what the draws do alike to all does not blur their comparison.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,7 +87,9 @@ def _with_sizes(
 ) -> Particles:
     sizes = _sizes(twins, share)
     rows = [h if np.isnan(s) else h.sized(s) for h, s in zip(twins * DRAWS, sizes, strict=True)]
-    return Particles(twins, share, parameters, baseline.faults(rows), report_faults(rows))
+    return Particles(
+        twins, share, parameters, baseline.faults(rows), report_faults(rows, baseline.bounce_m)
+    )
 
 
 def _sizes(twins: tuple[Hypothesis, ...], share: Array) -> Array:
@@ -97,7 +99,7 @@ def _sizes(twins: tuple[Hypothesis, ...], share: Array) -> Array:
     return np.asarray(low + share * (high - low))
 
 
-def report_faults(rows: Sequence[Hypothesis]) -> ReportFaults:
+def report_faults(rows: Sequence[Hypothesis], bounce_m: Mapping[int, float]) -> ReportFaults:
     """What each of [R] does to the reports of its vehicle."""
 
     def where(kind: Type) -> list[bool]:
@@ -109,9 +111,11 @@ def report_faults(rows: Sequence[Hypothesis]) -> ReportFaults:
             for h, w in zip(rows, where(kind), strict=True)
         ]
 
+    stuck = where(Type.STUCK)
+    bounce = [s * bounce_m.get(h.sysid, 0.0) for s, h in zip(stuck, rows, strict=True)]
     return ReportFaults(
         jump_m=np.where(where(Type.OFFSET), JUMP_SIGMA_M, 0.0),
         drift_mps=np.where(where(Type.DRIFT), DRIFT_SIGMA_MPS, 0.0),
-        noise_m=np.array(size(Type.NOISE)),
+        noise_m=np.array(size(Type.NOISE)) + np.array(bounce),
         lag_s=np.array(size(Type.DELAY)),
     )

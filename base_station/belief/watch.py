@@ -6,8 +6,8 @@ the nominal twin before the drawing, in units of its predicted spread.
 """
 
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,10 +44,15 @@ class Moment:
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """Everything that is taken for granted: the model, and the faults already established."""
+    """Everything that is taken for granted: the model, and the faults already established.
+
+    `bounce_m`: of vehicles (system ids) whose reports do not stand still when their fix does, the
+    sigma around it.
+    """
 
     model: twin.FleetModel
     known: tuple[Hypothesis, ...] = ()
+    bounce_m: Mapping[int, float] = field(default_factory=dict)
 
     def faults(self, hypotheses: Sequence[Hypothesis]) -> twin.FaultArrays:
         """[H] fault rows of `hypotheses`, each on top of what is known."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.planning.requests import OpenLoopPlan, PlanProgress, PlanRequest, PolicyWeights
+from base_station.planning.requests import OpenLoopPlan, PlanProgress, PlanRequest, Policy
 from hil.scenario import StationView
 
 Progress = Callable[[int, int, float], None]  # time steps, of so many, mean reward
@@ -25,7 +25,7 @@ class Attempt:
     wall_s: float
     curve: tuple[tuple[float, float], ...]
     plan: OpenLoopPlan | None = None
-    policy: PolicyWeights | None = None
+    policy: Policy | None = None
     predicted_m: NDArray[np.float64] | None = None
 
 

@@ -3,22 +3,20 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from base_station.planning.policy import act
-from base_station.planning.requests import PolicyWeights
-from base_station.planning.tasks.beta import BetaProblem
+from base_station.planning.tasks.beta import BetaProblem, Play
 from base_station.twin import EAST, NORTH
 
 Array = NDArray[np.float64]
 
 
-def way(problem: BetaProblem, weights: PolicyWeights) -> Array:
-    """Where the nominal twin goes under the policy until all have delivered, [K+1, V, 2]."""
+def way(problem: BetaProblem, play: Play) -> Array:
+    """Where the nominal twin goes under what is played until all have delivered, [K+1, V, 2]."""
     states, delivered = problem.start[None].copy(), problem.delivered[None].copy()
     places_m = [states[0, :, NORTH : EAST + 1].copy()]
     for k in range(problem.steps):
         if delivered.all():
             break
-        actions = act(weights, problem.observe(states, delivered, np.full(1, k)))
+        actions = play(states, delivered, k)
         problem.move(problem.model.nominal, states, actions, np.ones(1, dtype=np.bool_))
         delivered |= problem.arrived(states)
         places_m.append(states[0, :, NORTH : EAST + 1].copy())

@@ -107,6 +107,16 @@ class PolicyWeights:
 
 
 @dataclass(frozen=True)
+class Script:
+    """A closed-loop plan that is a rule of ours, by name; it was tried on the twin."""
+
+    name: str
+
+
+Policy = PolicyWeights | Script
+
+
+@dataclass(frozen=True)
 class Training:
     """One training, accepted or rejected; `curve` rows are (timesteps, mean episode reward)."""
 
@@ -132,7 +142,7 @@ class PlanReady:
     kind: Kind
     trainings: tuple[Training, ...]
     plan: OpenLoopPlan | None = None
-    policy: PolicyWeights | None = None
+    policy: Policy | None = None
     predicted_m: Array | None = None
     reused: bool = False
 
@@ -224,7 +234,9 @@ def _prediction(tree: dict[str, Any] | None) -> Prediction | None:
     return Prediction(**{**tree, "contacts": contacts})
 
 
-def _policy(tree: dict[str, Any] | None) -> PolicyWeights | None:
+def _policy(tree: dict[str, Any] | None) -> Policy | None:
     if tree is None:
         return None
+    if "name" in tree:
+        return Script(tree["name"])
     return PolicyWeights(tuple((_array(w), _array(b)) for w, b in tree["layers"]))

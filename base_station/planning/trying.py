@@ -1,9 +1,11 @@
 """One attempt of each planner, all behind one interface: view, request, seed and progress."""
 
+import time
 from collections.abc import Callable
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from base_station.planning.actors import Actor, Gaussian
 from base_station.planning.attempts import Attempt, Progress, Try
@@ -15,7 +17,8 @@ from base_station.planning.learning.ppo import train, train_lstm
 from base_station.planning.learning.presets import PRESETS, Preset
 from base_station.planning.learning.qtable import learn_table
 from base_station.planning.problems import alpha_problem, beta_problem
-from base_station.planning.requests import PlanRequest
+from base_station.planning.requests import PlanRequest, Script
+from base_station.planning.scripted.nose_first import Scene, nose_first, without_drive
 from base_station.planning.scripted.ram import ram
 from base_station.planning.searches.cem import cem
 from base_station.planning.searches.gradient import gradient
@@ -23,7 +26,13 @@ from base_station.planning.searches.search import Search, search
 from base_station.planning.searches.shooting import shooting
 from base_station.planning.searches.stepwise import stepwise
 from base_station.planning.tasks.alpha import AlphaProblem, AlphaTask
-from base_station.planning.tasks.beta import BetaProblem, BetaTask, success_share
+from base_station.planning.tasks.beta import (
+    BetaProblem,
+    BetaTask,
+    brought_home,
+    policy_of,
+    success_share,
+)
 from base_station.planning.tasks.candidates import (
     NOTHING,
     Candidate,
@@ -35,6 +44,10 @@ from hil.scenario import StationView
 
 Learn = Callable[[Lesson, StationView, AlphaProblem], Learned]
 
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+RULE = "nose_first"
 SUCCESS_ROLLOUTS = 64
 SUCCESS_SHARE = 0.95
 SEARCHES: dict[str, Search] = {
@@ -47,10 +60,9 @@ SEARCHES: dict[str, Search] = {
 
 
 def try_of(view: StationView, request: PlanRequest) -> tuple[str, Try]:
-    """A planner's name and one attempt of it; the mission is learned by PPO, whatever the scenario
-    says of the experiment."""
+    """A planner's name and one attempt of it."""
     if request.kind == "beta":
-        return "ppo", learn_beta
+        return ("ppo", learn_beta) if view.planning.mission == "ppo" else (RULE, try_rule)
     name = view.planning.planner
     if name in SEARCHES:
         return name, partial(search_alpha, SEARCHES[name])
@@ -117,7 +129,37 @@ def taught_mission(
     assert isinstance(done.actor, Gaussian)
     took = done.accepted, done.timesteps, done.wall_s, done.curve
     weights = done.actor.weights
-    return Attempt(*took, policy=weights, predicted_m=way(problem, weights))
+    return Attempt(*took, policy=weights, predicted_m=way(problem, policy_of(problem, weights)))
+
+
+def try_rule(view: StationView, request: PlanRequest, seed: int, progress: Progress) -> Attempt:
+    """The rule, if it brings the fleet home in the twin."""
+    began_s = time.perf_counter()
+    problem = beta_problem(view, request)
+    lost = without_drive(problem.model, problem.faults, problem.broken)
+    scene = Scene(
+        problem.model,
+        problem.goals_m,
+        problem.commands,
+        problem.radius_m,
+        problem.broken,
+        lost,
+    )
+
+    def play(states: Array, delivered: Flags, _k: int) -> Array:
+        return nose_first(scene, states, delivered)
+
+    home = brought_home(problem, play, np.random.default_rng([seed, 1]), SUCCESS_ROLLOUTS)
+    share, steps = float(home.mean()), SUCCESS_ROLLOUTS * problem.steps
+    progress(steps, steps, share)
+    return Attempt(
+        share >= SUCCESS_SHARE,
+        steps,
+        time.perf_counter() - began_s,
+        ((float(steps), share),),
+        policy=Script(RULE),
+        predicted_m=way(problem, play),
+    )
 
 
 def preset_of(request: PlanRequest) -> Preset:

@@ -4,11 +4,14 @@ import math
 from collections import deque
 from dataclasses import replace
 
+import numpy as np
+
 from base_station.autopilots import adapter
 from base_station.receiving.fleet_clock import FleetClock
 from base_station.receiving.local_origin import LocalOrigin
 from base_station.receiving.telemetry import Frame, Sample, Track, frame_at, note
 from hil import mavlink
+from hil.frames import wgs84_to_ned
 from hil.scenario import StationView
 
 WAIT_FOR_LATE_S = 0.3  # fleet time; then a tick goes on without the vehicle that is late
@@ -99,12 +102,26 @@ class Fleet:
             time_s = self._next_tick * self.period_s
             pairs = zip(self.tracks, self._autopilots, strict=True)
             driven = [t.mode_at(time_s - self.period_s) == a.driven_mode for t, a in pairs]
-            frames.append(frame_at(self.tracks, time_s, self.period_s, self.newest_s, driven))
+            frame = frame_at(self.tracks, time_s, self.period_s, self.newest_s, driven)
+            own_s = np.array([a.latency_s for a in self._autopilots])
+            frame = replace(frame, delay_s=frame.delay_s + own_s)
+            frames.append(self._with_fixes(frame))
             self._next_tick += 1
             if len(frames) == round(LONG_GAP_S / self.period_s):
                 newest = int((self.newest_s + 1e-3) / self.period_s)
                 self._next_tick = max(self._next_tick, newest)
         return frames
+
+    def _with_fixes(self, frame: Frame) -> Frame:
+        """What receivers and estimators say of themselves, where the view counts that."""
+        if self.view.diagnosis.evidence == "position":
+            return frame
+        origin, nowhere = self.view.origin.origin(), (float("nan"), float("nan"))
+        fixes = [t.status.fix_deg for t in self.tracks]
+        places_m = [wgs84_to_ned(*fix, origin) if fix else nowhere for fix in fixes]
+        pairs = zip(self.tracks, self._autopilots, strict=True)
+        lost = np.array([a.lost(t.status) for t, a in pairs])
+        return replace(frame, fix_m=np.array(places_m), lost=lost)
 
     def excuse(self, absent_s: float) -> None:
         """Silence of vehicles does not count while the station itself was not listening."""

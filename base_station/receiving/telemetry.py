@@ -45,6 +45,7 @@ class Status:
     gps_satellites: int = 0
     sticks_us: tuple[int, ...] = ()  # RC_CHANNELS 1 to 4, where a pilot has a transmitter
     gps_fix: int = 0  # GPS_FIX_TYPE
+    fix_deg: tuple[float, float] | None = None  # latitude, longitude of GPS_RAW_INT
     ekf_flags: int = 0  # EKF_STATUS_FLAGS
     prearm_ok: bool = False  # SYS_STATUS
 
@@ -63,6 +64,8 @@ class Frame:
     delay_s: Array  # [V] from here until orders that answer it take effect, usually
     jitter_s: Array  # [V] standard deviation of that
     driven: NDArray[np.bool_]  # [V] since the frame before it was in a mode that takes set-points
+    fix_m: Array | None = None  # [V, 2] what the receivers say, where that counts
+    lost: NDArray[np.bool_] | None = None  # [V] the estimator says that it has no position
 
     @property
     def all_stand(self) -> bool:
@@ -165,7 +168,12 @@ def note(status: Status, value: object, motors: int) -> Status:
         case mavlink.Battery():
             return replace(status, battery_percent=value.remaining_percent)
         case mavlink.GpsRaw():
-            return replace(status, gps_satellites=value.satellites, gps_fix=value.fix_type)
+            return replace(
+                status,
+                gps_satellites=value.satellites,
+                gps_fix=value.fix_type,
+                fix_deg=(value.lat_deg, value.lon_deg),
+            )
         case mavlink.RcChannels():
             return replace(status, sticks_us=value.channels_us[:4])
         case mavlink.EkfStatus():

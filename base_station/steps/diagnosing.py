@@ -2,7 +2,7 @@
 
 from dataclasses import asdict, replace
 
-from base_station import execution
+from base_station import execution, mission
 from base_station.belief import doubt as doubts
 from base_station.belief import escalation, hearing
 from base_station.belief.diagnosis import Verdict
@@ -162,6 +162,9 @@ def _believe(desk: Desk, verdict: Verdict) -> None:
     desk.watch.memory.extend(memory)
     desk.doubt = None
     desk.alarmed.clear()
+    if mission.must_be_left(doubt.estimated(index), desk.view):
+        desk.goals = desk.goals.leaving(doubt.suspect)
+        desk.say("text", f"{name} is left where it is: its autopilot needs its GPS to drive")
     request_beta(desk)
 
 

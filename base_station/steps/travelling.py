@@ -41,7 +41,7 @@ def await_beta(desk: Desk, number: int, frame: Frame) -> Orders:
 def drive(desk: Desk, phase: OnMission, frame: Frame) -> Orders:
     """[4] The policy decides once per control period, from the fleet as it is believed to be."""
     _deliver(desk, frame)
-    if all(desk.goals.delivered):
+    if all(desk.goals.settled):
         desk.enter(Returning(frame.time_s))
         return desk.hold()
     if frame.time_s - phase.since_s > desk.view.planning.beta_horizon_s:
@@ -103,6 +103,7 @@ def go_home(desk: Desk, phase: Returning, frame: Frame) -> Orders:
     """Helpers drive back; when all are home and at rest, the mission is done or planned again."""
     drivers = mission.can_drive(desk.watch, desk.view)
     away = ~desk.goals.home(desk.watch.state, desk.orders.driven) & drivers
+    away[list(desk.goals.left)] = False
     if away.any():
         if frame.time_s - phase.since_s > RETURN_TIMEOUT_S:
             _plan_mission_again(desk, "a rover found no way back")
@@ -115,8 +116,11 @@ def go_home(desk: Desk, phase: Returning, frame: Frame) -> Orders:
         still_since_s = frame.time_s
     desk.phase = replace(phase, still_since_s=still_since_s)
     if frame.time_s - still_since_s >= execution.REST_S:
-        if desk.goals.there(desk.watch.state).all():
-            desk.say("end", "all goals reached")
+        there = desk.goals.there(desk.watch.state)
+        there[list(desk.goals.left)] = True
+        if there.all():
+            told = "all goals that can be" if desk.goals.left else "all goals"
+            desk.say("end", f"{told} reached")
             desk.enter(Finished())
         else:
             _plan_mission_again(desk, "a vehicle was moved off its goal")

@@ -13,6 +13,7 @@ from base_station.twin.model import (
     perturbed,
 )
 from base_station.twin.state import (
+    AHEAD,
     DRIVEN,
     EAST,
     HELD_EAST,
@@ -24,6 +25,8 @@ from base_station.twin.state import (
     SP_NORTH,
     SP_YAW,
     STATE_SIZE,
+    THROTTLE,
+    TURN,
     V_EAST,
     V_NORTH,
     YAW,
@@ -33,6 +36,7 @@ from base_station.twin.state import (
 from base_station.twin.step import Advanced, advance, advance_in_place, report
 
 __all__ = [
+    "AHEAD",
     "DRIVEN",
     "EAST",
     "HELD_EAST",
@@ -44,6 +48,8 @@ __all__ = [
     "SP_NORTH",
     "SP_YAW",
     "STATE_SIZE",
+    "THROTTLE",
+    "TURN",
     "V_EAST",
     "V_NORTH",
     "YAW",

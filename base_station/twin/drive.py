@@ -1,7 +1,8 @@
 """One step of a vehicle's autopilot, motors and ground, for all lanes of a tile.
 
 The autopilot's equations are those of the simulated vehicles: a velocity loop that is
-feed-forward with a bounded integrator; a skid-steered frame turns towards its velocity.
+feed-forward with a bounded integrator; a skid-steered frame turns towards its velocity. Those of
+heading-first autopilots are ArduPilot's.
 """
 
 import math
@@ -10,12 +11,15 @@ from typing import Any
 from base_station.twin.compiled import compiled, inlined
 from base_station.twin.lanes import least, magnitude, most, put, root, signed, take, where
 from base_station.twin.state import (
+    AHEAD,
     DRIVEN,
     I_X,
     I_Y,
     SP_EAST,
     SP_NORTH,
     SP_YAW,
+    THROTTLE,
+    TURN,
     V_EAST,
     V_NORTH,
     YAW,
@@ -49,6 +53,10 @@ RATE_GAIN = 0.3  # output per rad/s
 SCRUB_RATE_RADPS = 0.05  # set-point from which on scrub is fully fed forward
 TINY = 1e-30
 
+# columns of `helm`, as in HeadingFirst
+SPEED_FF, SPEED_P, SPEED_I, ACCEL, SLEW, STOP = range(6)
+HEADING_P, RATE_MAX, TURN_ACCEL, RATE_FF, RATE_P, RATE_I = range(6, 12)
+
 
 @compiled
 def take_commands(vehicles: Any, tile: Any, lane: int, setpoints: Any, driven: Any) -> None:
@@ -60,10 +68,20 @@ def take_commands(vehicles: Any, tile: Any, lane: int, setpoints: Any, driven: A
             speed = math.hypot(setpoints[v, 0], setpoints[v, 1])
             share = min(1.0, vehicles.speed_limit_mps[v] / max(speed, TINY))
             north, east = setpoints[v, 0] * share, setpoints[v, 1] * share
-            if vehicles.skid[v] and speed * share >= TURNING_MPS:
+            yaw = setpoints[v, 2]
+            if vehicles.heading_first[v]:
+                if not math.isnan(yaw):
+                    tile[v, SP_YAW, lane] = yaw
+                elif speed >= STANDSTILL_MPS:
+                    tile[v, SP_YAW, lane] = math.atan2(east, north)
+                else:  # told to stand: it does not turn on
+                    tile[v, SP_YAW, lane] = tile[v, YAW, lane]
+                along = tile[v, SP_YAW, lane]
+                north, east = math.cos(along) * north + math.sin(along) * east, 0.0
+            elif vehicles.skid[v] and speed * share >= TURNING_MPS:
                 tile[v, SP_YAW, lane] = math.atan2(east, north)
-            elif not math.isnan(setpoints[v, 2]):
-                tile[v, SP_YAW, lane] = setpoints[v, 2]
+            elif not math.isnan(yaw):
+                tile[v, SP_YAW, lane] = yaw
         else:
             tile[v, I_X, lane] = tile[v, I_Y, lane] = 0.0
         tile[v, SP_NORTH, lane], tile[v, SP_EAST, lane] = north, east
@@ -71,7 +89,9 @@ def take_commands(vehicles: Any, tile: Any, lane: int, setpoints: Any, driven: A
 
 @inlined
 def drive(vehicles: Any, tile: Any, v: int, locked: bool) -> None:
-    if vehicles.skid[v]:
+    if vehicles.heading_first[v]:
+        ux, uy, uyaw = heading_first_commands(vehicles, tile, v)
+    elif vehicles.skid[v]:
         ux, uy, uyaw = skid_commands(vehicles, tile, v)
     else:
         ux, uy, uyaw = omni_commands(vehicles, tile, v, locked)
@@ -138,12 +158,51 @@ def skid_commands(vehicles: Any, tile: Any, v: int) -> Any:
 
 
 @inlined
+def heading_first_commands(vehicles: Any, tile: Any, v: int) -> Any:
+    """Speed and heading loops apart: the whole speed along the nose, wherever that points.
+
+    As ArduPilot's rover in GUIDED, and in HOLD, where its throttle slews to zero and brakes.
+    """
+    helm, dt = vehicles.helm[v], vehicles.dt_s
+    c, s, on = take(tile, v, COS), take(tile, v, SIN), take(tile, v, DRIVEN)
+    before = take(tile, v, AHEAD)
+    ahead = before + clipped(on * take(tile, v, SP_NORTH) - before, helm[ACCEL] * dt)
+    put(tile, v, AHEAD, on * ahead)
+    seen_n = (1.0 - take(tile, v, STUCK)) * take(tile, v, V_NORTH)
+    seen_e = (1.0 - take(tile, v, STUCK + 1)) * take(tile, v, V_EAST)
+    seen = c * seen_n + s * seen_e
+    asked = where(magnitude(ahead) > 0.0, 1.0, 0.0)
+    rolls = where(magnitude(seen) >= helm[STOP], 1.0, 0.0)
+    moving = on * most(asked, rolls)
+    i_x = moving * clipped(take(tile, v, I_X) + helm[SPEED_I] * dt * (ahead - seen), 1.0)
+    put(tile, v, I_X, i_x)
+    wanted = moving * (helm[SPEED_FF] * ahead + helm[SPEED_P] * (ahead - seen) + i_x)
+    throttle = take(tile, v, THROTTLE)
+    throttle = throttle + clipped(clipped(wanted, 1.0) - throttle, helm[SLEW] * dt)
+    put(tile, v, THROTTLE, throttle)
+    yaw, rate = take(tile, v, YAW), take(tile, v, YAW_RATE)
+    sp_yaw = where(on > 0.0, take(tile, v, SP_YAW), yaw)
+    put(tile, v, SP_YAW, sp_yaw)
+    error = wrapped(sp_yaw - yaw)
+    turn = clipped(helm[HEADING_P] * error, helm[RATE_MAX])
+    turn = clipped(turn, root(2.0 * helm[TURN_ACCEL] * magnitude(error)))
+    before = take(tile, v, TURN)
+    turn = on * (before + clipped(turn - before, helm[TURN_ACCEL] * dt))
+    put(tile, v, TURN, turn)
+    i_yaw = on * clipped(take(tile, v, I_Y) + helm[RATE_I] * dt * (turn - rate), 1.0)
+    put(tile, v, I_Y, i_yaw)
+    steer = helm[RATE_FF] * turn + on * helm[RATE_P] * (turn - rate) + i_yaw
+    return throttle, 0.0 * on, steer
+
+
+@inlined
 def accelerate(vehicles: Any, tile: Any, v: int, ux: Any, uy: Any, uyaw: Any, locked: bool) -> None:
     """Motors, then what the ground takes: it stops a motion, and never reverses it."""
     c, s = take(tile, v, COS), take(tile, v, SIN)
     north, east = take(tile, v, V_NORTH), take(tile, v, V_EAST)
     vx, vy = c * north + s * east, c * east - s * north
-    step = vehicles.dt_s * take(tile, v, DRIVEN)
+    brakes = 1.0 if vehicles.heading_first[v] else 0.0  # in HOLD, too
+    step = vehicles.dt_s * most(brakes, take(tile, v, DRIVEN))
     x = gained(tile, v, 0, ux, uy, vx, vy)
     y = gained(tile, v, 1, ux, uy, vx, vy)
     if not locked:

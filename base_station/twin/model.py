@@ -8,6 +8,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from base_station.autopilots import HeadingFirst, adapter
 from base_station.belief.hypotheses import Hypothesis
 from hil.airframe import Airframe, Motor
 from hil.faults import NED_AXES, Type, Unit
@@ -34,6 +35,8 @@ class Vehicles(NamedTuple):
     grips: Flags  # [V] wheels that can't roll sideways: without them, no side force is looked at
     turn_line: Array  # [V] feed-forward of a skid-steered turn: output per rad/s ...
     turn_scrub: Array  # [V] ... and the output that overcomes scrub
+    heading_first: Flags  # [V] its autopilot has the `helm`, [V, 12] in the order of HeadingFirst
+    helm: Array
     bounds_m: Array  # [4] north min, north max, east min, east max
     obstacles_m: Array  # [O, 5] strokes with a round brush: from and to (north, east), radius
     reach_m: float  # gaps that can close within a step
@@ -75,6 +78,7 @@ class FleetModel:
     @classmethod
     def from_view(cls, view: StationView) -> Self:
         frames = [member.frame for member in view.fleet]
+        helms = [adapter(member.autopilot, member.frame).helm for member in view.fleet]
         motors = max(len(f.motors) for f in frames)
         fastest_mps = max(m.free_speed_mps for f in frames for m in f.motors)
         vehicles = Vehicles(
@@ -93,6 +97,8 @@ class FleetModel:
             grips=np.array([f.side_grip_n > 0.0 for f in frames]),
             turn_line=np.array([_turn(f)[0] for f in frames]),
             turn_scrub=np.array([_turn(f)[1] for f in frames]),
+            heading_first=np.array([h is not None for h in helms]),
+            helm=np.array([h or (0.0,) * len(HeadingFirst._fields) for h in helms]),
             bounds_m=_bounds_m(view.arena),
             obstacles_m=_strokes_m(view.obstacles),
             reach_m=2.0 * fastest_mps / view.clock.autopilot_hz,

@@ -15,11 +15,14 @@ I_X = 6  # integrators of the autopilot's velocity loop, body axes, motor output
 I_Y = 7
 HELD_NORTH = 8  # m, what a stuck GPS axis goes on reporting, on average
 HELD_EAST = 9
-SP_NORTH = 10  # m/s, set-point in effect
+SP_NORTH = 10  # m/s, set-point in effect; of a heading-first vehicle its speed along SP_YAW, and 0
 SP_EAST = 11
 SP_YAW = 12  # rad
 DRIVEN = 13  # 1: follows the set-point; 0: HOLD, all wheels free
-STATE_SIZE = 14
+AHEAD = 14  # of a heading-first autopilot: speed and turn rate that it asks for, m/s ...
+TURN = 15  # ... and rad/s, ...
+THROTTLE = 16  # ... and the output of its speed loop, which slews
+STATE_SIZE = 17
 
 
 def initial_state(positions_m: ArrayLike, yaws_rad: ArrayLike) -> Array:

@@ -76,6 +76,15 @@ class Encoder(Framer):
         velocity = (north_mps, east_mps, 0.0)
         return self._setpoint(target, time_ms, mask, None, velocity, yaw_rad)
 
+    def turning_setpoint(
+        self, target: int, time_ms: int, speed_mps: float, yaw_rate_radps: float
+    ) -> bytes:
+        """SET_POSITION_TARGET_LOCAL_NED, mask 1479 (velocity and yaw rate): speed along the nose,
+        signed as the first component is."""
+        mask = int(TypeMask.POSITION | TypeMask.ACCELERATION | TypeMask.YAW)
+        velocity = (speed_mps, 0.0, 0.0)
+        return self._setpoint(target, time_ms, mask, None, velocity, None, yaw_rate_radps)
+
     def position_setpoint(
         self, target: int, time_ms: int, north_m: float, east_m: float, yaw_rad: float | None = None
     ) -> bytes:
@@ -92,6 +101,7 @@ class Encoder(Framer):
         position_m: tuple[float, float, float] | None,
         velocity_mps: tuple[float, float, float] | None,
         yaw_rad: float | None,
+        yaw_rate_radps: float | None = None,
     ) -> bytes:
         return self.encode(
             LocalSetpoint(
@@ -103,7 +113,7 @@ class Encoder(Framer):
                 position_m=position_m,
                 velocity_mps=velocity_mps,
                 yaw_rad=yaw_rad,
-                yaw_rate_radps=None,
+                yaw_rate_radps=yaw_rate_radps,
             )
         )
 

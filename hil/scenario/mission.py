@@ -19,10 +19,11 @@ class Priors(Model):
 
 
 class Diagnosis(Model):
-    """`obeyed_within_s`: how long an order may take until it is surely obeyed (round trip, its
+    """`evidence`: reports of positions; or with them what the receivers say by themselves.
+    `obeyed_within_s`: how long an order may take until it is surely obeyed (round trip, its
     spread, and what gets lost); by a slower link nothing is judged, and nobody is driven."""
 
-    evidence: Literal["position"] = "position"
+    evidence: Literal["position", "position_and_fixes"] = "position"
     decide_at: Annotated[float, Field(gt=0.5, lt=1)] = 0.99
     plan_error: Annotated[float, Field(gt=0, lt=0.5)] = 0.01
     false_alarms_per_hour: Positive = 0.1
@@ -32,13 +33,15 @@ class Diagnosis(Model):
 
 
 class Planning(Model):
-    """`planner` finds the experiment; the mission is always learned. `exploration` is how qtable
+    """`planner` finds the experiment; `mission` says whether the way home is learned, or a rule for
+    vehicles that turn before they drive. `exploration` is how qtable
     and dqn choose commands; `workers` try side by side, 0: one for each core but one; `reuse` looks
     for a plan that was learned before from the very same."""
 
     planner: Literal[
         "ppo", "ppo_lstm", "qtable", "dqn", "cem", "shooting", "random", "gradient", "ram"
     ] = "ppo"
+    mission: Literal["ppo", "nose_first"] = "ppo"
     exploration: Literal["greedy", "epsilon", "boltzmann"] = "epsilon"
     objective: Literal["paper_distance", "paper_printed", "information"] = "information"
     preset: Literal["tuned", "paper"] = "tuned"
@@ -72,7 +75,7 @@ class Limits(Model):
 
     speed_mps: Positive = 1.0
     probe_speed_mps: Positive = 0.5
-    probe_pulse_s: Annotated[float, Field(gt=0, le=0.5)] = 0.5
+    probe_pulse_s: Annotated[float, Field(gt=0, le=2.0)] = 0.5
     goal_radius_m: Positive = 0.2
     mission_timeout_s: Positive = 180.0
 

@@ -9,7 +9,7 @@ import pytest
 
 from base_station.autopilots import NAMES, adapter
 from base_station.receiving.telemetry import Status
-from hil.airframe import OMNI_PLUS, QUAD_X
+from hil.airframe import OMNI_PLUS, QUAD_X, SKID_STEER
 from hil.errors import InputError
 from hil.mavlink import (
     COMPONENT_GCS,
@@ -115,6 +115,14 @@ def test_type_masks(name: str, yaw_rad: float | None, mask: int) -> None:
     setpoint = said(drive)
     assert isinstance(setpoint, LocalSetpoint)
     assert setpoint.type_mask == mask
+
+
+@pytest.mark.parametrize(("speed_mps", "mask"), [(0.0, 1479), (0.3, 3527)])
+def test_told_to_stand_ardupilot_is_not_told_to_face_north(speed_mps: float, mask: int) -> None:
+    stand = said(adapter("ardupilot", SKID_STEER).velocity(encoder(), 1, 2.0, speed_mps, 0.0, None))
+    assert isinstance(stand, LocalSetpoint)
+    assert stand.type_mask == mask
+    assert stand.yaw_rate_radps == (0.0 if speed_mps == 0.0 else None)
 
 
 def test_ardupilot_is_ready_when_its_ekf_has_a_position() -> None:

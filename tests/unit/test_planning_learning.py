@@ -19,7 +19,7 @@ from base_station.planning.policy import Commands, act, arrived, to_setpoints
 from base_station.planning.problems import alpha_problem, beta_problem, blocked_directions
 from base_station.planning.requests import PlanRequest, PolicyWeights, encode
 from base_station.planning.tasks.alpha import AlphaTask
-from base_station.planning.tasks.beta import BetaTask, nominal_starts, success_share
+from base_station.planning.tasks.beta import BetaTask, nominal_starts, policy_of, success_share
 from base_station.planning.tasks.candidates import best_candidate
 from base_station.planning.tasks.objectives import rho_alpha
 from base_station.twin import (
@@ -211,7 +211,7 @@ def test_a_healthy_fleet_learns_to_deliver_where_standing_still_does_not(rescue_
     assert foreseen_m[0] == pytest.approx(asked.states[0, :, NORTH : EAST + 1])
     nearest_m = np.linalg.norm(foreseen_m - problem.goals_m, axis=2).min(axis=0)
     assert (nearest_m <= problem.radius_m).all()
-    standing_m = way(problem, zero_policy(task))
+    standing_m = way(problem, policy_of(problem, zero_policy(task)))
     assert len(standing_m) == problem.steps + 1
     assert np.ptp(standing_m, axis=0) == pytest.approx(0.0, abs=0.01)
 

@@ -207,16 +207,21 @@ def success_share(
     problem: BetaProblem, weights: PolicyWeights, rng: np.random.Generator, n: int
 ) -> float:
     """The share of `n` perturbed rollouts of the deterministic policy that bring all home."""
+    return float(brought_home(problem, policy_of(problem, weights), rng, n).mean())
+
+
+def policy_of(problem: BetaProblem, weights: PolicyWeights) -> Play:
+    """A learned policy, played on any number of twins."""
 
     def play(states: Array, delivered: Flags, k: int) -> Array:
-        return act(weights, problem.observe(states, delivered, np.full(n, k)))
+        return act(weights, problem.observe(states, delivered, np.full(len(states), k)))
 
-    return float(brought_home(problem, play, rng, n).mean())
+    return play
 
 
 def brought_home(problem: BetaProblem, play: Play, rng: np.random.Generator, n: int) -> Flags:
     """Which of `n` perturbed rollouts from nominal starts deliver all and, after rolling out in
-    HOLD, leave the broken vehicle at its goal, [N]."""
+    HOLD, leave the broken vehicle at its goal, or where it was settled before, [N]."""
     parameters = perturbed(problem.model, rng, n)
     states = nominal_starts(problem, rng, n)
     delivered = np.tile(problem.delivered, (n, 1))
@@ -227,6 +232,9 @@ def brought_home(problem: BetaProblem, play: Play, rng: np.random.Generator, n: 
             delivered |= problem.arrived(states)
     done = np.asarray(delivered.all(axis=1))
     if problem.broken is not None:
-        offset = (problem.goals_m - states[..., NORTH : EAST + 1])[:, problem.broken]
+        at_rest_m = problem.start[problem.broken, NORTH : EAST + 1]
+        settled = problem.delivered[problem.broken]
+        place_m = at_rest_m if settled else problem.goals_m[problem.broken]
+        offset = place_m - states[:, problem.broken, NORTH : EAST + 1]
         done &= np.linalg.norm(offset, axis=1) <= problem.radius_m + SLACK_M
     return done
