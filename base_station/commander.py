@@ -36,7 +36,8 @@ class _Sent:
 
 
 class Commander:
-    """One entry per vehicle, in fleet order. A released vehicle gets nothing but heartbeats."""
+    """One entry per vehicle, in fleet order. A released vehicle gets nothing but heartbeats, until
+    it is given back."""
 
     def __init__(self, view: StationView) -> None:
         self._view, self._rate_hz = view, view.clock.telemetry_hz
@@ -140,6 +141,14 @@ class Commander:
             t.status.armed and t.status.mode == autopilot.hold_mode
             for t, autopilot in zip(tracks, self.autopilots, strict=True)
         )
+
+    def give_back(self) -> tuple[int, ...]:
+        """Vehicles that were let go of are ours again; what was done with them is forgotten."""
+        back = tuple(sorted(self.released))
+        for i in back:
+            self._sent[i] = _Sent()
+        self.released.clear()
+        return back
 
     def takeovers(self, time_s: float) -> list[int]:
         """Vehicles in a mode, disarmed, or under sticks, with no command of ours."""

@@ -134,6 +134,10 @@ class StationNode:
         view = self.station.desk.view
         self._say_at_once(stop_all(view, self.station.autopilots))
 
+    def give_back(self) -> None:
+        """Vehicles that were taken over are the station's again, from the next step on."""
+        self.station.give_back()
+
     def emergency_stop(self) -> None:
         """Motors off."""
         self._say_at_once(disarm_all(self.station.desk.view))

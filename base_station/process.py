@@ -24,6 +24,7 @@ from base_station.field.budget import refuse_overload
 from base_station.field.consent import ask_before_arming
 from base_station.field.dry import DryEnd
 from base_station.field.keys import Typed, emergency_key
+from base_station.fitted import fleet_model
 from base_station.journal import Head, Journal, journal_files
 from base_station.listeners import open_listeners
 from base_station.node import StationNode
@@ -169,6 +170,8 @@ def run(arguments: argparse.Namespace) -> None:
                 typed = keys.typed(ready)
                 if typed is Typed.STOP:
                     raise EmergencyStop
+                if typed is Typed.GIVE_BACK:
+                    node.give_back()
                 if typed is Typed.GONE:
                     raise StopRequested
                 node.step(time.monotonic() + offset_s, time.time_ns() // 1000)
@@ -221,7 +224,7 @@ def _compile_twin(view: StationView) -> None:
     """The first call compiles the kernel, which takes seconds; later no step may."""
     goals = [[m.goal.north_m, m.goal.east_m] for m in view.fleet]
     state = twin.initial_state(goals, [0.0] * len(goals))
-    watch = Watch(view, Baseline(twin.FleetModel.from_view(view)), state, 0.0)
+    watch = Watch(view, Baseline(fleet_model(view)), state, 0.0)
     still, fresh = np.zeros((len(goals), 2)), np.ones(len(goals), dtype=np.bool_)
     none = np.zeros(len(goals))
     frame = Frame(0.0, still, still, none, fresh, fresh, none, none, none, ~fresh)

@@ -214,7 +214,7 @@ class Station:
     def _mind_the_gap(self, gap: Gap, frame: Frame) -> None:
         """Everybody holds until all are heard again and at rest."""
         self.desk.orders = self.desk.hold()
-        over = gap.is_over(frame) or self.desk.ended
+        over = (gap.is_over(frame) and not self._commander.released) or self.desk.ended
         self._gap = None if over else gap
         if over and not self.desk.ended:
             bridge(self.desk, gap, frame)
@@ -246,12 +246,26 @@ class Station:
                 self.desk.say("contact", f"{a.name} touches {b.name}", sysids=[a.sysid, b.sysid])
             self._touched_s[pair] = frame.time_s
 
+    def give_back(self) -> None:
+        """A person says that the vehicles that were taken over may be commanded again.
+
+        Those that are disarmed stay so: a mission goes on when all hold, and are driven if armed.
+        """
+        back = self._commander.give_back()
+        names = ", ".join(self.desk.view.fleet[i].name for i in back) or "nobody"
+        self.desk.say("takeover", f"given back: {names}")
+        if back and self._gap is not None:
+            self._gap = replace(self._gap, heard_since_s=None)
+
     def _let_go_of_the_taken(self, frame: Frame) -> None:
         for i in self._commander.takeovers(frame.time_s):
             self._commander.released.add(i)
             name = self.desk.view.fleet[i].name
             self.desk.say("takeover", f"{name} was taken over: not commanded any more")
-            self.desk.stop("takeover")
+            if self.desk.view.safety is None:
+                self.desk.stop("takeover")
+            else:  # there is somebody who can give it back
+                self._open_gap(frame.time_s)
 
     def _mind_the_links(self, wall_s: float) -> None:
         """A vehicle that is not heard is waited for, and only then given up: radios fade."""

@@ -16,6 +16,7 @@ from base_station import twin
 from base_station.belief import detection, hearing, observer
 from base_station.belief.hypotheses import NONE, Hypothesis
 from base_station.execution import Orders
+from base_station.fitted import residual_m
 from base_station.receiving.telemetry import Frame
 from hil.faults import Type, Unit
 from hil.scenario import StationView
@@ -107,7 +108,8 @@ class Watch:
     def __init__(self, view: StationView, baseline: Baseline, state: Array, time_s: float) -> None:
         self.baseline = baseline
         self._faults = baseline.faults((_nothing_more(baseline.model),))
-        self._trusted, self._noise_m = ~baseline.blind, baseline.report_sigma_m[:, None]
+        self._trusted = ~baseline.blind
+        self._noise_m = np.hypot(baseline.report_sigma_m, residual_m(view))[:, None]
         self._period_s = 1.0 / view.clock.telemetry_hz
         self._observer = observer.start(baseline.model, state)
         self.sigma_m = np.full((len(view.fleet), 2), NOISE_SIGMA_M)  # of the residual, in metres

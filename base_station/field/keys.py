@@ -1,4 +1,4 @@
-"""One key stops everything: the space bar, where somebody sits at a terminal."""
+"""Where somebody sits at a terminal: the space bar stops everything, g gives vehicles back."""
 
 import os
 import termios
@@ -8,14 +8,16 @@ from contextlib import contextmanager, suppress
 from enum import Enum
 from typing import TextIO
 
-STOP = b" "
+STOP, GIVE_BACK = b" ", b"g"
 
 
 class Typed(Enum):
-    """STOP: the stop key was pressed. GONE: the terminal is no longer there."""
+    """STOP: the stop key was pressed; GIVE_BACK: the key that gives back who was taken over.
+    GONE: the terminal is no longer there."""
 
     NOTHING = "nothing"
     STOP = "stop"
+    GIVE_BACK = "give_back"
     GONE = "gone"
 
 
@@ -39,7 +41,9 @@ class Keys:
             return Typed.GONE
         if not text:
             return Typed.GONE
-        return Typed.STOP if STOP in text else Typed.NOTHING
+        if STOP in text:
+            return Typed.STOP
+        return Typed.GIVE_BACK if GIVE_BACK in text else Typed.NOTHING
 
 
 @contextmanager

@@ -3,7 +3,13 @@
 from base_station.identify.excitation import Excitation, Tried
 from base_station.identify.fit import AxisFit, fit_axis
 from base_station.identify.noise import NoiseFit, RestNoise
-from base_station.identify.responses import FirstOrder, Integrating, Response, response_of
+from base_station.identify.responses import (
+    FirstOrder,
+    Integrating,
+    NoseFirst,
+    Response,
+    response_of,
+)
 
 __all__ = [
     "AxisFit",
@@ -11,6 +17,7 @@ __all__ = [
     "FirstOrder",
     "Integrating",
     "NoiseFit",
+    "NoseFirst",
     "Response",
     "RestNoise",
     "Tried",

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from base_station.autopilots import Autopilot, HeadingFirst
 from hil.airframe import Airframe
 
 Array = NDArray[np.float64]
@@ -118,8 +119,57 @@ class Integrating(Response):
         return Derived(self._free_mps / stall, 1.0 + lost / speed_mps, latency_s)
 
 
-def response_of(name: str, frame: Airframe, axis: str) -> Response:
+class NoseFirst(Response):
+    """A heading-first autopilot, sent along its own nose, on DC motors: as the twin has it.
+
+    p = stall acceleration (m/s2), slew of the throttle (1/s), latency (s); its gains are known.
+    """
+
+    name = "heading_first"
+
+    def __init__(self, frame: Airframe, helm: HeadingFirst) -> None:
+        motors = [frame.motors[i - 1] for i in frame.axis_motors("x")]
+        self._free_mps = sum(m.free_speed_mps for m in motors) / len(motors)
+        self._rolling = frame.rolling_force_n / frame.mass_kg
+        self._helm = helm
+        stall = frame.axis_stall_force_n("x") / frame.mass_kg
+        self.start = np.array([stall, helm.slew_per_s, 0.1])
+        self.low = np.array([0.3 * stall, 0.1, 0.0])
+        self.high = np.array([3.0 * stall, 20.0, 1.5])
+        self.steps = np.array([0.02 * stall, 0.02, 0.01])
+
+    def speeds(self, p: Array, setpoint_mps: Array) -> Array:
+        stall, slew, _ = (float(x) for x in p)
+        helm, v, ahead, i, throttle = self._helm, 0.0, 0.0, 0.0, 0.0
+        out = np.empty(len(setpoint_mps))
+        for k, setpoint in enumerate(setpoint_mps.tolist()):
+            on = setpoint == setpoint
+            change = (setpoint if on else 0.0) - ahead
+            ahead = ahead + _clip(change, helm.accel_mps2 * DT_S) if on else 0.0
+            moving = on and not (ahead == 0.0 and abs(v) < helm.stop_mps)
+            i = _clip(i + helm.speed_i * DT_S * (ahead - v), 1.0) if moving else 0.0
+            wanted = helm.speed_ff * ahead + helm.speed_p * (ahead - v) + i if moving else 0.0
+            throttle += _clip(_clip(wanted, 1.0) - throttle, slew * DT_S)
+            v += DT_S * stall * (throttle - v / self._free_mps)
+            v = math.copysign(max(0.0, abs(v) - self._rolling * DT_S), v)
+            out[k] = v
+        return out
+
+    def derived(self, p: Array, speed_mps: float) -> Derived:
+        del speed_mps
+        quick = float(p[0]) * (1.0 / self._free_mps + self._helm.speed_p)
+        return Derived(1.0 / quick, 1.0, float(p[-1]))
+
+
+def _clip(value: float, limit: float) -> float:
+    return max(-limit, min(limit, value))
+
+
+def response_of(autopilot: Autopilot, frame: Airframe, axis: str) -> Response:
     """The model that an adapter names for its autopilot."""
+    name = autopilot.response
+    if autopilot.helm is not None:
+        return NoseFirst(frame, autopilot.helm)
     return Integrating(frame, axis) if name == Integrating.name else FirstOrder()
 
 

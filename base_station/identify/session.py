@@ -73,7 +73,7 @@ class Identification:
             axis = AXES[tried.axis]
             try:
                 axes[tried.index][axis] = fit_axis(
-                    tried, response_of(autopilot.response, member.frame, axis)
+                    tried, response_of(autopilot, member.frame, axis)
                 )
             except ValueError as error:
                 raise ValueError(f"{member.name}, body {axis}: {error}") from None

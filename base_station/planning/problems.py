@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from base_station.fitted import fleet_model
 from base_station.planning.policy import Commands
 from base_station.planning.requests import PlanRequest
 from base_station.planning.tasks.alpha import AlphaProblem
@@ -71,7 +72,7 @@ def beta_problem(view: StationView, request: PlanRequest) -> BetaProblem:
 
 def fenced(view: StationView) -> FleetModel:
     """The fleet to plan with: a geofence counts as a wall, which no plan may touch."""
-    model = FleetModel.from_view(view)
+    model = fleet_model(view)
     return model.within(view.geofence) if view.geofence else model
 
 

@@ -15,6 +15,7 @@ from typing import TextIO
 import numpy as np
 
 from base_station.belief.hypotheses import SIZES, candidates
+from base_station.fitted import fleet_model
 from base_station.planning.attempts import Attempts
 from base_station.planning.learning import ppo
 from base_station.planning.learning.lesson import Lesson
@@ -26,7 +27,7 @@ from base_station.planning.shelf import Shelf, default_folder
 from base_station.planning.tasks.alpha import AlphaTask
 from base_station.planning.tasks.candidates import best_candidate
 from base_station.planning.team import Team, team_size
-from base_station.twin import FleetModel, initial_state
+from base_station.twin import initial_state
 from hil.errors import HilError, InputError
 from hil.scenario import StationView, load_station_view
 
@@ -100,7 +101,7 @@ def warm_up(view: StationView) -> None:
 
 def apart(view: StationView, start: np.ndarray) -> np.ndarray:
     """The start with its vehicles in a row, out of each other's reach."""
-    model = FleetModel.from_view(view)
+    model = fleet_model(view)
     start = start.copy()
     start[:, 0] = 3.0 * float(model.vehicles.radius_m.max()) * np.arange(model.size)
     return start

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from base_station.autopilots import adapter
+from base_station.fitted import latency_s
 from base_station.receiving.fleet_clock import FleetClock
 from base_station.receiving.local_origin import LocalOrigin
 from base_station.receiving.telemetry import Frame, Sample, Track, frame_at, note
@@ -103,7 +104,7 @@ class Fleet:
             pairs = zip(self.tracks, self._autopilots, strict=True)
             driven = [t.mode_at(time_s - self.period_s) == a.driven_mode for t, a in pairs]
             frame = frame_at(self.tracks, time_s, self.period_s, self.newest_s, driven)
-            own_s = np.array([a.latency_s for a in self._autopilots])
+            own_s = np.array([latency_s(m) for m in self.view.fleet])
             frame = replace(frame, delay_s=frame.delay_s + own_s)
             frames.append(self._with_fixes(frame))
             self._next_tick += 1

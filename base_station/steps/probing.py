@@ -8,6 +8,7 @@ from base_station.commander import Commander
 from base_station.commands import Command
 from base_station.desk import Desk
 from base_station.execution import Orders
+from base_station.fitted import fleet_model
 from base_station.phases import Arming, Connecting, Probing
 from base_station.receiving.telemetry import Frame
 from base_station.steps.travelling import request_beta
@@ -58,7 +59,7 @@ def fresh_watch(desk: Desk) -> Watch:
     state = twin.initial_state(
         [s.position_m for s in newest], [t.status.yaw_rad for t in desk.fleet.tracks]
     )
-    baseline = Baseline(twin.FleetModel.from_view(desk.view), bounce_m=bouncing(desk.view))
+    baseline = Baseline(fleet_model(desk.view), bounce_m=bouncing(desk.view))
     return Watch(desk.view, baseline, state, desk.time_s)
 
 

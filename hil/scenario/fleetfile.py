@@ -16,7 +16,7 @@ from hil.scenario.fields import (
 )
 from hil.scenario.mission import Diagnosis, Limits, Planning
 from hil.scenario.places import Arena, Clock, OriginModel, Point
-from hil.scenario.station import FleetMember, Safety, StationView
+from hil.scenario.station import FleetMember, Identified, Safety, StationView
 from hil.scenario.vehicles import Sensors, Uncertainty
 
 
@@ -29,6 +29,20 @@ class FleetVehicle(Model):
     airframe: AirframeName
     autopilot: AutopilotName
     goal: Point
+
+
+class FoundVehicle(Model):
+    """What `hil identify` wrote of a vehicle."""
+
+    sysid: SysId
+    axes: dict[Literal["x", "y"], Identified]
+    noise: dict[str, float] = Field(default={})
+
+
+class Found(Model):
+    """The file that `hil identify` writes beside a fleet file; by the vehicles' names."""
+
+    identified: dict[VehicleName, FoundVehicle]
 
 
 class FleetFile(Model):
@@ -53,10 +67,18 @@ class FleetFile(Model):
         self.view()
         return self
 
-    def view(self) -> StationView:
-        """The same, as the station knows it."""
+    def view(self, found: "Found | None" = None) -> StationView:
+        """The same, as the station knows it, with what was found of the vehicles."""
         tree: dict[str, Any] = self.model_dump(exclude={"fleet"})
-        members = tuple(FleetMember(**v.model_dump(), start_yaw_deg=0.0) for v in self.fleet)
+        of = {} if found is None else found.identified
+        members = tuple(
+            FleetMember(
+                **v.model_dump(),
+                start_yaw_deg=0.0,
+                identified=of[v.name].axes if v.name in of else {},
+            )
+            for v in self.fleet
+        )
         return StationView(**tree, fleet=members, host="127.0.0.1")
 
 

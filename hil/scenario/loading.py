@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from hil.errors import InputError
 from hil.scenario.fields import Model
-from hil.scenario.fleetfile import FleetFile, is_fleet_file
+from hil.scenario.fleetfile import FleetFile, Found, is_fleet_file
 from hil.scenario.schema import Scenario
 from hil.scenario.station import StationView
 
@@ -29,11 +29,28 @@ def load_scenario(path: Path, overrides: Sequence[str] = ()) -> Scenario:
 
 
 def load_station_view(path: Path) -> StationView:
-    """Read a station view, or a fleet file as one. Raises InputError."""
+    """Read a station view, or a fleet file as one, with what `hil identify` wrote beside it.
+
+    Raises InputError.
+    """
     tree = read_map(path)
     if is_fleet_file(tree):
-        return validated(FleetFile, path, tree).view()
+        beside = path.with_suffix(".identified.yaml")
+        found = validated(Found, beside, read_map(beside)) if beside.exists() else None
+        return _fitting(validated(FleetFile, path, tree), found, beside).view(found)
     return validated(StationView, path, tree)
+
+
+def _fitting(fleet: FleetFile, found: Found | None, path: Path) -> FleetFile:
+    """The fleet, if what was found is of it. Raises InputError."""
+    sysids = {v.name: v.sysid for v in fleet.fleet}
+    for name, vehicle in ({} if found is None else found.identified).items():
+        if sysids.get(name) != vehicle.sysid:
+            raise InputError(
+                f"{path}: identified.{name}.sysid = {vehicle.sysid}: no such vehicle here; "
+                "run hil identify again, or remove the file"
+            )
+    return fleet
 
 
 def validated(model: type[M], path: Path, tree: dict[str, Any]) -> M:

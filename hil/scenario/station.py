@@ -38,6 +38,19 @@ def _twinned_airframe(name: str) -> str:
     return name
 
 
+class Identified(Model):
+    """What `hil identify` found of one body axis, as it writes it."""
+
+    model: str
+    time_constant_s: Positive
+    speed_gain: Positive
+    latency_s: NonNegative
+    parameters: tuple[Finite, ...]
+    residual_mps: NonNegative
+    residual_m: NonNegative
+    nominal_residual_m: NonNegative
+
+
 class FleetMember(Model):
     """What the station knows of a vehicle."""
 
@@ -49,6 +62,7 @@ class FleetMember(Model):
     goal: Point
     mavlink_port: Port | None = None  # udpin on the view's host
     connection: ConnectionText | None = None
+    identified: dict[Literal["x", "y"], Identified] = Field(default={})
 
     @model_validator(mode="after")
     def _can_be_spoken_to(self) -> Self:

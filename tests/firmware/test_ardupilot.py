@@ -79,7 +79,7 @@ def test_it_is_waited_for_armed_driven_and_identified(tmp_path: Path) -> None:
     with firmware_world(lone_rover(), tmp_path) as scenario:
         stored = identify(fleet_file(scenario, tmp_path / "fleet.yaml"), None)
     found = yaml.safe_load(stored.read_text())["identified"]["rover_1"]["axes"]["x"]
-    assert found["model"] == "first_order"
+    assert found["model"] == "heading_first"
     assert found["residual_m"] <= 0.5 * found["nominal_residual_m"]
 
 

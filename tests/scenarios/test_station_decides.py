@@ -3,7 +3,7 @@
 import pytest
 
 from hil.mavlink import Encoder, RoverMode
-from hil.scenario import Scenario, load_scenario
+from hil.scenario import Safety, Scenario, load_scenario
 from tests.conftest import SCENARIOS
 from tests.scenarios.bench import run_until_ended, scripted, start
 
@@ -75,6 +75,30 @@ def test_a_person_who_takes_over_keeps_the_vehicle() -> None:
     assert rig.node.station.desk.verdict is None
     assert rig.node.station.desk.fleet.tracks[2].status.mode == RoverMode.MANUAL
     assert rig.node.station.desk.fleet.tracks[0].status.mode == RoverMode.HOLD
+
+
+def test_who_is_given_back_goes_on_with_the_mission() -> None:
+    """Where vehicles may be real the fleet waits for it, and does not go on before."""
+    rig, heard, times = start(_scenario("healthy"), scripted(0.8))
+    desk, person = rig.node.station.desk, Encoder(255, 190)
+    safety = Safety(allow_contact=True, fence_margin_m=0.0)
+    desk.view = desk.view.model_copy(update={"safety": safety})
+    taken_s = back_s = None
+    for time_s in times:
+        if taken_s is None and time_s > 6.0:
+            taken_s = time_s
+            rig.vehicle(3).receive("gcs", person.set_mode(3, RoverMode.MANUAL))
+        if taken_s is not None and back_s is None and time_s > taken_s + 10.0:
+            back_s = time_s
+            assert not desk.ended
+            assert desk.fleet.tracks[2].status.mode == RoverMode.MANUAL
+            rig.node.give_back()
+        if rig.node.finished:
+            break
+        assert time_s < 200.0
+    assert any("given back: rover_3" in text for text in heard.texts("takeover"))
+    assert desk.phase.name == "done"
+    assert heard.texts("anomaly") == []
 
 
 @pytest.mark.parametrize("when", ["rover_2.east_m > 99", "rover_2.north_m < -2.9"])

@@ -87,6 +87,17 @@ def test_a_failsafe_that_leaves_the_driven_mode_is_not_argued_with(
     assert commander.takeovers(1.0 + TAKEOVER_S) == [0]
 
 
+def test_a_vehicle_that_is_given_back_is_commanded_again(rescue_view: StationView) -> None:
+    commander, tracks = Commander(rescue_view), _tracks(RoverMode.HOLD)
+    commander.released.add(1)
+    assert all(c.sysid != 2 for c in commander.carry_out(hold(3), tracks, 1.0))
+    assert commander.give_back() == (1,)
+    assert commander.released == set()
+    tracks[1].status = replace(tracks[1].status, mode=int(RoverMode.MANUAL))
+    assert SetMode(2, int(RoverMode.HOLD)) in commander.carry_out(hold(3), tracks, 2.0)
+    assert commander.takeovers(2.0 + TAKEOVER_S) == []
+
+
 def test_a_late_heartbeat_is_no_takeover_and_is_not_argued_with(rescue_view: StationView) -> None:
     commander, orders = Commander(rescue_view), _drive_first()
     commander.carry_out(orders, _tracks(RoverMode.HOLD), 0.0)

@@ -12,6 +12,7 @@ from base_station.planning.laboratory.trails import of_experiment, of_mission
 from base_station.planning.planner import plan
 from base_station.planning.problems import alpha_problem, beta_problem
 from base_station.planning.process import warm_up
+from base_station.planning.requests import PolicyWeights
 from hil.scenario import StationView
 
 LOG = logging.getLogger("reproduce")
@@ -65,6 +66,6 @@ def _figures(base: StationView, out: Path, rows: dict[str, Row]) -> None:
         figures.experiment(trails, names, radii_m, out / "experiment.svg")
     asked = row_of_three(base, home)
     mission, policy = beta_problem(base, asked), plan(base, asked, lambda _: None).policy
-    if policy is not None:
+    if isinstance(policy, PolicyWeights):
         trails = of_mission(mission, policy)
         figures.rescue(trails, mission.goals_m, mission.broken, radii_m, out / "rescue.svg")

@@ -60,7 +60,7 @@ MISSIONS: dict[str, Mission | None] = {"home": home, "wander": wander, "ppo": No
 def saved_policy(text: str) -> PolicyWeights:
     """From the JSON line of a planner's answer. Raises ValueError, KeyError or TypeError."""
     answer = decode(text.strip())
-    if not isinstance(answer, PlanReady) or answer.policy is None:
+    if not isinstance(answer, PlanReady) or not isinstance(answer.policy, PolicyWeights):
         raise ValueError("no policy in it")
     return answer.policy
 
