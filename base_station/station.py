@@ -255,7 +255,7 @@ class Station:
         names = ", ".join(self.desk.view.fleet[i].name for i in back) or "nobody"
         self.desk.say("takeover", f"given back: {names}")
         if back and self._gap is not None:
-            self._gap = replace(self._gap, heard_since_s=None)
+            self._gap = replace(self._gap, standing_since_s=None)
 
     def _let_go_of_the_taken(self, frame: Frame) -> None:
         for i in self._commander.takeovers(frame.time_s):
