@@ -3,9 +3,9 @@
     python benchmarks/chaos.py [--runs 300] [--udp 0] [--out runs/chaos.jsonl] [--learn] [--table]
 
 Cells of the matrix come in a shuffled order that is always the same, run k has seed k, and each
-result is a line of JSON, so that a run that was stopped goes on. In memory the experiment is found by
-`cem`; a mission is learnt once for each belief and place (to a metre) and used again (--learn: in
-every run). Then a table in Markdown. Exit code 1 when something happened that must not: a wrong
+result is a line of JSON, so that a run that was stopped goes on. In memory `cem` finds the
+experiment; a mission is learnt once for each belief and place (to a metre) and used again (--learn:
+in every run). Then a table in Markdown. Exit code 1 when something happened that must not: a wrong
 verdict with a posterior of 0.99 or more, a false alarm, a set-point executed for more than 3 s.
 """
 
