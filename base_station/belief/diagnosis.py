@@ -3,7 +3,8 @@
 A row is one twin with one draw of what is unknown about it. Per row and axis a Kalman filter
 follows how far reports are off the twin's prediction, and how fast that changes; what is left, the
 innovation, is white under the true hypothesis, so that an error made once is not counted at every
-sample. A jump or a drift of the GPS is a prior on that state, so its size need not be searched.
+sample. A drift of the GPS is a prior on that state, so its size need not be searched; a jump is one
+that dies away, because the vehicle's own filter takes to it over a second or so.
 """
 
 import math
@@ -29,8 +30,8 @@ SAMPLE_PERIOD_S = 0.3  # about what the vehicle's filter remembers
 class ReportFaults(NamedTuple):
     """What is wrong with the reports of the suspect, for rows [R]; all zero: nothing."""
 
-    jump_m: Array  # sigma of a jump at the onset
-    drift_mps: Array  # sigma of a steady drift from then on
+    drift_mps: Array  # sigma of a drift from the onset on
+    settling_s: Array  # time constant with which it dies away: a jump; infinite: steady
     noise_m: Array  # sigma of additional noise
     lag_s: Array  # additional age
 
@@ -65,12 +66,9 @@ def fresh_fit(rows: int) -> Fit:
 
 
 def struck(fit: Fit, faults: ReportFaults, rows: NDArray[np.bool_]) -> Fit:
-    """The GPS faults of `rows` [R] begin: a jump and a drift of unknown size."""
-    jump = np.where(rows, faults.jump_m, 0.0)[:, None] ** 2
+    """The GPS faults of `rows` [R] begin: a drift of unknown size."""
     drift = np.where(rows, faults.drift_mps, 0.0)[:, None] ** 2
-    return replace(
-        fit, variance_m2=fit.variance_m2 + jump, drift_variance=fit.drift_variance + drift
-    )
+    return replace(fit, drift_variance=fit.drift_variance + drift)
 
 
 def carried_over(fit: Fit, rows: NDArray[np.intp], off: NDArray[np.bool_]) -> Fit:
@@ -87,15 +85,21 @@ def carried_over(fit: Fit, rows: NDArray[np.intp], off: NDArray[np.bool_]) -> Fi
     )
 
 
-def expected(fit: Fit, period_s: float) -> Fit:
-    """The offset one sample later, before its report is looked at."""
+def expected(fit: Fit, settling_s: Array, period_s: float) -> Fit:
+    """The offset one sample later, before its report is looked at; `settling_s` [R]."""
+    steady = np.isinf(settling_s)
+    tau_s = np.where(steady, 1.0, settling_s)
+    keep = np.where(steady, 1.0, np.exp(-period_s / tau_s))[:, None]
+    reach_s = np.where(steady[:, None], period_s, tau_s[:, None] * (1.0 - keep))
     wander = WANDER_SIGMA_M**2 + (MODEL_ERROR * fit.path_m) ** 2
-    grown = 2.0 * period_s * fit.covariance + period_s**2 * fit.drift_variance
+    grown = 2.0 * reach_s * fit.covariance + reach_s**2 * fit.drift_variance
     return replace(
         fit,
-        offset_m=fit.offset_m + period_s * fit.drift_mps,
+        offset_m=fit.offset_m + reach_s * fit.drift_mps,
+        drift_mps=keep * fit.drift_mps,
         variance_m2=fit.variance_m2 + grown + wander,
-        covariance=fit.covariance + period_s * fit.drift_variance,
+        covariance=keep * (fit.covariance + reach_s * fit.drift_variance),
+        drift_variance=keep**2 * fit.drift_variance,
         path_m=np.zeros_like(fit.path_m),
     )
 
@@ -105,10 +109,12 @@ def sigma_m(fit: Fit, noise_m: Array) -> Array:
     return np.sqrt(fit.variance_m2 + NOISE_SIGMA_M**2 + noise_m[:, None] ** 2)
 
 
-def judge(fit: Fit, observed_m: Array, predicted_m: Array, noise_m: Array, period_s: float) -> Fit:
+def judge(
+    fit: Fit, observed_m: Array, predicted_m: Array, faults: ReportFaults, period_s: float
+) -> Fit:
     """Take in one report [2] against predictions [R, 2]: Student's t on the innovations."""
-    fit = expected(fit, period_s)
-    sigma = sigma_m(fit, noise_m)
+    fit = expected(fit, faults.settling_s, period_s)
+    sigma = sigma_m(fit, faults.noise_m)
     innovation = observed_m - predicted_m - fit.offset_m
     z2 = (innovation / sigma) ** 2
     per_axis = _LOG_NORM - np.log(sigma) - (TAIL_DOF + 1) / 2 * np.log1p(z2 / TAIL_DOF)

@@ -119,7 +119,7 @@ def anchor(doubt: Doubt, report_m: Array) -> Doubt:
     states = doubt.states[rows]
     stuck = drawn.motion.gps_stuck > 0.5
     blind = stuck.copy()
-    moved_off = (drawn.reports.jump_m > 0.0) | (drawn.reports.drift_mps > 0.0)
+    moved_off = drawn.reports.drift_mps > 0.0
     blind[:, doubt.suspect] |= moved_off[:, None]
     position = states[..., twin.NORTH : twin.EAST + 1]
     held = states[..., twin.HELD_NORTH : twin.HELD_EAST + 1]
@@ -194,7 +194,7 @@ def advanced(
         states=states,
         trail_m=trail_m,
         hearing=heard,
-        fit=diagnosis.judge(fit, observed_m, now_m, reports.noise_m, since_s),
+        fit=diagnosis.judge(fit, observed_m, now_m, reports, since_s),
         unknown=doubt.unknown + gained,
         last_report_m=observed_m,
         judged_s=frame.time_s,

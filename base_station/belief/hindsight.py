@@ -101,5 +101,8 @@ class Hindsight:
     def _faults(self) -> tuple[twin.FaultArrays, ReportFaults]:
         drawn, on = self._rows.particles, self._active[:, None, None]
         motion = (np.where(on, f, s) for f, s in zip(drawn.motion, self._sound, strict=True))
-        reports = (np.where(self._active, f, 0.0) for f in drawn.reports)
-        return twin.FaultArrays(*motion), ReportFaults(*reports)
+        reports = drawn.reports
+        return twin.FaultArrays(*motion), reports._replace(
+            noise_m=np.where(self._active, reports.noise_m, 0.0),
+            lag_s=np.where(self._active, reports.lag_s, 0.0),
+        )

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 DRAWS = 24  # K
 SHRINKAGE = 0.95  # of resampled draws towards their mean, made up for by noise (Liu and West 2001)
 JUMP_SIGMA_M = 3.0
+SETTLING_S = (0.1, 0.8)  # of a vehicle's filter after a jump
 DRIFT_SIGMA_MPS = 0.3
 
 
@@ -87,9 +88,8 @@ def _with_sizes(
 ) -> Particles:
     sizes = _sizes(twins, share)
     rows = [h if np.isnan(s) else h.sized(s) for h, s in zip(twins * DRAWS, sizes, strict=True)]
-    return Particles(
-        twins, share, parameters, baseline.faults(rows), report_faults(rows, baseline.bounce_m)
-    )
+    reports = report_faults(rows, share, baseline.bounce_m)
+    return Particles(twins, share, parameters, baseline.faults(rows), reports)
 
 
 def _sizes(twins: tuple[Hypothesis, ...], share: Array) -> Array:
@@ -99,8 +99,13 @@ def _sizes(twins: tuple[Hypothesis, ...], share: Array) -> Array:
     return np.asarray(low + share * (high - low))
 
 
-def report_faults(rows: Sequence[Hypothesis], bounce_m: Mapping[int, float]) -> ReportFaults:
-    """What each of [R] does to the reports of its vehicle."""
+def report_faults(
+    rows: Sequence[Hypothesis], share: Array, bounce_m: Mapping[int, float]
+) -> ReportFaults:
+    """What each of [R] does to the reports of its vehicle.
+
+    How fast a vehicle's filter takes to a jump is unknown: `share` [R] of a range.
+    """
 
     def where(kind: Type) -> list[bool]:
         return [h.kind == (Unit.GPS, kind) for h in rows]
@@ -113,9 +118,12 @@ def report_faults(rows: Sequence[Hypothesis], bounce_m: Mapping[int, float]) -> 
 
     stuck = where(Type.STUCK)
     bounce = [s * bounce_m.get(h.sysid, 0.0) for s, h in zip(stuck, rows, strict=True)]
+    jump, (fast_s, slow_s) = np.array(where(Type.OFFSET)), SETTLING_S
+    settling_s = fast_s + share * (slow_s - fast_s)
+    drift_mps = np.where(where(Type.DRIFT), DRIFT_SIGMA_MPS, 0.0)
     return ReportFaults(
-        jump_m=np.where(where(Type.OFFSET), JUMP_SIGMA_M, 0.0),
-        drift_mps=np.where(where(Type.DRIFT), DRIFT_SIGMA_MPS, 0.0),
+        drift_mps=np.where(jump, JUMP_SIGMA_M / settling_s, drift_mps),
+        settling_s=np.where(jump, settling_s, np.inf),
         noise_m=np.array(size(Type.NOISE)) + np.array(bounce),
         lag_s=np.array(size(Type.DELAY)),
     )

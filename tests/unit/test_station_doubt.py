@@ -28,7 +28,7 @@ class Plant:
     """
 
     def __init__(self, view: StationView, fault: Hypothesis, seed: int = 0) -> None:
-        self.reports = report_faults([fault], {})
+        self.reports = report_faults([fault], np.full(1, 0.5), {})
         self.size = fault.fault.size if fault.fault else ()
         self.past_m: list[NDArray[np.float64]] = []
         self.model = twin.FleetModel.from_view(view)
@@ -62,9 +62,10 @@ class Plant:
     def _falsified(self, since_s: float) -> NDArray[np.float64]:
         late = round(float(self.reports.lag_s[0]) / PERIOD_S)
         report_m = self.past_m[-1 - late][SUSPECT].copy()
-        if self.reports.jump_m[0]:
-            report_m += self.size[:2]
-        if self.reports.drift_mps[0]:
+        settling_s = self.reports.settling_s[0]
+        if np.isfinite(settling_s):
+            report_m += (1.0 - np.exp(-since_s / settling_s)) * np.array(self.size[:2])
+        elif self.reports.drift_mps[0]:
             report_m += since_s * np.array(self.size[:2])
         report_m += self.reports.noise_m[0] * self.rng.standard_normal(2)
         return report_m

@@ -76,6 +76,9 @@ def test_an_estimator_that_is_lost_is_no_motors_fault(known) -> None:
 
 def test_reports_over_a_stuck_fix_may_bounce_where_the_estimator_does(known) -> None:
     rows = [h for h in known if h.name in ("gps_stuck", "gps_north_stuck", "motor_x_off")]
-    noise = dict(zip((h.name for h in rows), report_faults(rows, {2: 0.3}).noise_m, strict=True))
+    share = np.full(len(rows), 0.5)
+    noise = dict(
+        zip((h.name for h in rows), report_faults(rows, share, {2: 0.3}).noise_m, strict=True)
+    )
     assert noise == {"gps_stuck": 0.3, "gps_north_stuck": 0.3, "motor_x_off": 0.0}
-    assert not report_faults(rows, {}).noise_m.any()
+    assert not report_faults(rows, share, {}).noise_m.any()
