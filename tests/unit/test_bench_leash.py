@@ -33,8 +33,19 @@ def test_a_station_that_has_come_back_is_told_what_it_needs_for_its_next_tick() 
     assert leash.until_s == 12.0 + LEASH_S
 
 
-def test_while_the_station_learns_time_passes_as_it_does_outside() -> None:
-    leash = Leash(speed=0.0)
-    leash.lengthen(7.0, True, now_s=0.0)
-    leash.lengthen(9.0, True, now_s=0.5)
-    assert leash.until_s == pytest.approx(7.0 + LEASH_S + 0.5)
+def test_the_world_keeps_to_real_time_while_the_station_learns() -> None:
+    leash = Leash(0.0)
+    leash.lengthen(10.0, False, 100.0)
+    leash.lengthen(10.4, True, 100.1)
+    assert leash.until_s == 10.9
+    leash.lengthen(10.8, True, 100.2)
+    assert leash.until_s == pytest.approx(11.0)
+    leash.lengthen(10.9, False, 100.2)
+    assert leash.until_s == pytest.approx(11.4)
+
+
+def test_a_pace_that_was_asked_for_is_kept_while_learning() -> None:
+    leash = Leash(4.0)
+    leash.lengthen(10.0, True, 0.0)
+    leash.lengthen(20.0, True, 1.0)
+    assert leash.until_s == pytest.approx(14.5)

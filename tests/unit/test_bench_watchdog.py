@@ -2,37 +2,8 @@
 
 import pytest
 
-from hil.bench.leash import Leash
 from hil.bench.watchdog import FIRST_TICK_WITHIN_S, HANG_S, Watchdog
 from hil.errors import ProcessDiedError
-
-
-def test_the_leash_is_half_a_second_and_longer_before_the_first_tick() -> None:
-    leash = Leash(0.0)
-    assert leash.lengthen(None, False, 0.0)
-    assert leash.until_s == 3.0
-    assert not leash.lengthen(2.0, False, 0.0)
-    assert leash.until_s == 3.0
-    assert leash.lengthen(10.0, False, 0.0)
-    assert leash.until_s == 10.5
-
-
-def test_the_world_keeps_to_real_time_while_the_station_learns() -> None:
-    leash = Leash(0.0)
-    leash.lengthen(10.0, False, 100.0)
-    leash.lengthen(10.4, True, 100.1)
-    assert leash.until_s == 10.9
-    leash.lengthen(10.8, True, 100.2)
-    assert leash.until_s == pytest.approx(11.0)
-    leash.lengthen(10.9, False, 100.2)
-    assert leash.until_s == pytest.approx(11.4)
-
-
-def test_a_pace_that_was_asked_for_is_kept_while_learning() -> None:
-    leash = Leash(4.0)
-    leash.lengthen(10.0, True, 0.0)
-    leash.lengthen(20.0, True, 1.0)
-    assert leash.until_s == pytest.approx(14.5)
 
 
 def test_progress_of_either_is_progress() -> None:
