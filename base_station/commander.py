@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 from base_station.autopilots import adapter
 from base_station.commands import Arm, Command, Drive, SetMode
 from base_station.execution import Orders
-from base_station.receiving.telemetry import Status, Track
+from base_station.receiving.telemetry import MISSED, Status, Track
 from hil.mavlink import stick
 from hil.scenario import StationView
 
 ARM_REPEAT_S = 0.5
 REPEAT_S = 0.2  # of a mode: until it has been taken, a vehicle does something else
-LOSSY, MISSED = 0.01, 0.01  # from which loss on; the chance that is left of missing all copies
+LOSSY = 0.01  # from which loss on copies are sent
 STICK_US = 100
 LATE, ANSWERED_S = 3.0, 0.2  # until no answer comes any more: standard deviations, and at least
 SURE = 0.7  # of the round trip: it varies

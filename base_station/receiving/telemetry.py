@@ -19,7 +19,8 @@ HISTORY = 64
 ROUND_TRIPS = 20
 MIDDLE_80 = 2.563  # standard deviations wide
 LOSS_WINDOW_S = 5.0
-MISSED, SPREAD = 0.01, 3.0  # when an order is surely obeyed: copies all lost; standard deviations
+MISSED = 0.01  # the chance that is left of missing all copies of an order
+SPREAD = 3.0  # standard deviations of the round trip until it is surely obeyed
 
 
 @dataclass(frozen=True)
