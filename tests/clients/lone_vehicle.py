@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from rover_process import free_port
+from free_ports import free_ports
 
 PATIENCE_S = 30.0
 SYSID = 2
@@ -45,7 +45,8 @@ def lone_vehicle(
     yaw = "free" if airframe == "skid_steer" else "locked"  # it has to turn
     scenario = folder / "lone.yaml"
     scenario.write_text(LONE.format(sysid=SYSID, airframe=airframe, yaw=yaw))
-    physics, ports = free_port(), Ports(free_port(), free_port(), free_port())
+    physics, *others = free_ports(4)
+    ports = Ports(*others)
     world = ["hil.cli", "world", str(scenario), "--physics-port", str(physics)]
     vehicle = ["sim_vehicles.process", str(scenario), "--sysid", str(SYSID)]
     vehicle += ["--physics-port", str(physics), "--mavlink-port", str(ports.mavlink)]

@@ -10,6 +10,7 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
+from free_ports import free_ports
 from lone_vehicle import PATIENCE_S, SYSID, Ports
 
 from hil.mavlink import Encoder
@@ -30,12 +31,6 @@ RATES = (
 )
 
 
-def free_tcp_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 async def first(stream: AsyncIterator[Any], wanted: Callable[[Any], bool] = lambda _: True) -> Any:
     async def search() -> Any:
         async for value in stream:
@@ -48,7 +43,7 @@ async def first(stream: AsyncIterator[Any], wanted: Callable[[Any], bool] = lamb
 
 @asynccontextmanager
 async def connected(address: str) -> AsyncIterator[Any]:
-    system = mavsdk.System(port=free_tcp_port())
+    system = mavsdk.System(port=free_ports(1, kind=socket.SOCK_STREAM)[0])
     try:
         await system.connect(address)
         await first(system.core.connection_state(), lambda state: state.is_connected)

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from free_ports import free_ports
+
 from hil.physics_link import (
     AT_REST_MPS2,
     PhysicsState,
@@ -22,12 +24,6 @@ PATIENCE_S = 30.0
 ZERO = (0.0, 0.0, 0.0)
 
 
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 class RoverProcess:
     """The process, its physics, and the ports it speaks MAVLink on."""
 
@@ -35,7 +31,7 @@ class RoverProcess:
         self.physics = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.physics.bind(("127.0.0.1", 0))
         self.physics.settimeout(PATIENCE_S)
-        self.mavlink_port, self.injector_port = free_port(), free_port()
+        self.mavlink_port, self.injector_port = free_ports(2)
         self.ticks = 0
         ports = {
             "--physics-port": self.physics.getsockname()[1],

@@ -3,7 +3,6 @@
 import contextlib
 import queue
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -88,17 +87,3 @@ def child(*argv: str, cwd: Path = ROOT) -> Iterator[Child]:
         started.wait()
         with contextlib.suppress(OSError):
             started.close_stdin()
-
-
-def free_port_base(count: int) -> int:
-    """A base such that base, base + 10, ... are free UDP ports."""
-    for base in range(21000, 32000, 7):
-        with contextlib.ExitStack() as stack:
-            try:
-                for i in range(count):
-                    sock = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
-                    sock.bind(("127.0.0.1", base + 10 * i))
-            except OSError:
-                continue
-            return base
-    raise AssertionError("no free ports")

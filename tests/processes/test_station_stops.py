@@ -6,11 +6,12 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import pytest
+from free_ports import free_ports
 
 from hil.lifeline import dying_with_parent
 from hil.mavlink import (
@@ -32,7 +33,7 @@ PATIENCE_S = 60.0
 class Vehicles:
     """Three that say that they are there, and hear what they are told."""
 
-    def __init__(self, stack: ExitStack, ports: list[int]) -> None:
+    def __init__(self, stack: ExitStack, ports: Sequence[int]) -> None:
         self._sockets = []
         for sysid, port in enumerate(ports, start=1):
             sock = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
@@ -61,7 +62,7 @@ def station(
 ) -> Iterator[tuple[subprocess.Popen[bytes], Vehicles, int]]:
     """The process, its vehicles, and our end of the terminal that it was started from."""
     with ExitStack() as stack:
-        ports = _free_ports(3)
+        ports = free_ports(3)
         fleet = tuple(
             m.model_copy(update={"mavlink_port": p})
             for m, p in zip(rescue_view.fleet, ports, strict=True)
@@ -83,17 +84,6 @@ def station(
         assert process.stdout is not None
         assert b"ready" in process.stdout.readline()
         yield process, Vehicles(stack, ports), ours
-
-
-def _free_ports(count: int) -> list[int]:
-    with ExitStack() as stack:
-        socks = [
-            stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
-            for _ in range(count)
-        ]
-        for sock in socks:
-            sock.bind(("127.0.0.1", 0))
-        return [sock.getsockname()[1] for sock in socks]
 
 
 def _close(fd: int) -> None:

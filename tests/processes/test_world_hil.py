@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from children import free_port_base
+from free_ports import free_ports
 from pymavlink import mavutil
 
 from hil.frames import ned_to_wgs84
@@ -19,7 +19,7 @@ PATIENCE_S = 60.0
 
 def test_a_board_joins_gets_sensors_and_drives(tmp_path: Path) -> None:
     """2 s of full throttle ahead: it has moved, and a disarmed board stands."""
-    port = free_port_base(1)
+    (port,) = free_ports(1)
     board_vehicle = {
         "name": "board",
         "sysid": 1,

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from children import HIL, ROOT, Child, child, free_port_base
+from children import HIL, ROOT, Child, child
 from fake_vehicle import FakeVehicle
+from free_ports import free_ports
 
 from hil.scenario import FaultModel
 from hil.world.lockstep import SILENT_AFTER_S
@@ -20,7 +21,7 @@ FORWARD = (1900, 1900, 1500, 1500)
 
 @pytest.fixture
 def base() -> int:
-    return free_port_base(3)
+    return free_ports(3, step=10)[0]
 
 
 @pytest.fixture

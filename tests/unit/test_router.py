@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 
 import pytest
+from free_ports import free_ports
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -45,9 +46,7 @@ def routed(stack: ExitStack, connection: Connection) -> Router:
 
 
 def bound(stack: ExitStack) -> tuple[Router, int]:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind((HOST, 0))
-        port = probe.getsockname()[1]
+    (port,) = free_ports(1)
     return routed(stack, parse_connection(f"udpin:{HOST}:{port}")), port
 
 
