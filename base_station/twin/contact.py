@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from base_station.twin.compiled import inlined
-from base_station.twin.lanes import anywhere, least, most, put, root, take, where
+from base_station.twin.lanes import anywhere, least, most, put, root, shortened, take, where
 from base_station.twin.state import EAST, NORTH
-from base_station.twin.tile import BUSY, INVERSE_INERTIA, INVERSE_MASS
+from base_station.twin.tile import BUSY, INVERSE_INERTIA, INVERSE_MASS, shift
 
 NORMAL_N = 0  # unit vector from the first to the second
 NORMAL_E = 1
@@ -31,7 +31,9 @@ NO_MASS = 1e-30
 
 
 @inlined
-def find_pairs(vehicles: Any, tile: Any, pairs: Any, found: int, contacts: Any, bodies: Any) -> int:
+def find_pairs(
+    vehicles: Any, tile: Any, places: Any, pairs: Any, found: int, contacts: Any, bodies: Any
+) -> int:
     """Fill `contacts` and `bodies` with vehicles that may touch; returns how many.
 
     BUSY of the ground becomes 1 in lanes with a contact.
@@ -43,8 +45,8 @@ def find_pairs(vehicles: Any, tile: Any, pairs: Any, found: int, contacts: Any, 
         i: Any = pairs[k, 0]
         j: Any = pairs[k, 1]
         touch = radius[i] + radius[j]
-        north = take(tile, j, NORTH) - take(tile, i, NORTH)
-        east = take(tile, j, EAST) - take(tile, i, EAST)
+        north = shortened(take(places, j, NORTH) - take(places, i, NORTH))
+        east = shortened(take(places, j, EAST) - take(places, i, EAST))
         square = north * north + east * east
         if anywhere(square < (touch + reach) * (touch + reach)):
             distance = root(square)
@@ -52,13 +54,13 @@ def find_pairs(vehicles: Any, tile: Any, pairs: Any, found: int, contacts: Any, 
             nn = where(distance >= CENTRED_M, north * per, 1.0)
             gap = distance - touch
             bodies[n, 0], bodies[n, 1] = i, j
-            enter(vehicles, tile, i, j, radius[j], nn, east * per, gap, contacts, n)
+            enter(vehicles, tile, places, i, j, radius[j], nn, east * per, gap, contacts, n)
             n += 1
     return n
 
 
 @inlined
-def find_walls(vehicles: Any, tile: Any, n: int, contacts: Any, bodies: Any) -> int:
+def find_walls(vehicles: Any, tile: Any, places: Any, n: int, contacts: Any, bodies: Any) -> int:
     """Add what meets walls and obstacles to the first `n` contacts; returns how many it is then."""
     radius, reach, walls = vehicles.radius_m, vehicles.reach_m, vehicles.bounds_m
     ground: Any = np.uintp(tile.shape[0] - 1)
@@ -68,14 +70,15 @@ def find_walls(vehicles: Any, tile: Any, n: int, contacts: Any, bodies: Any) -> 
         is_east = 1.0 if side > 0 else 0.0
         for v in range(tile.shape[0] - 1):
             i = np.uintp(v)
-            at = take(tile, i, axis)
-            to_low, to_high = at - walls[2 * side], walls[2 * side + 1] - at
+            at = take(places, i, axis)
+            to_low = shortened(at - walls[2 * side])
+            to_high = shortened(walls[2 * side + 1] - at)
             gap = least(to_low, to_high) - radius[i]
             if anywhere(gap < reach):
                 towards = where(to_low < to_high, -1.0, 1.0)
                 nn, ne = towards * (1.0 - is_east), towards * is_east
                 bodies[n, 0], bodies[n, 1] = i, ground
-                enter(vehicles, tile, i, ground, 0.0, nn, ne, gap, contacts, n)
+                enter(vehicles, tile, places, i, ground, 0.0, nn, ne, gap, contacts, n)
                 n += 1
     for k in range(vehicles.obstacles_m.shape[0]):
         stroke = vehicles.obstacles_m[k]
@@ -83,7 +86,8 @@ def find_walls(vehicles: Any, tile: Any, n: int, contacts: Any, bodies: Any) -> 
         per_square = 1.0 / max(along_n * along_n + along_e * along_e, CENTRED_M * CENTRED_M)
         for v in range(tile.shape[0] - 1):
             i = np.uintp(v)
-            north, east = stroke[0] - take(tile, i, NORTH), stroke[1] - take(tile, i, EAST)
+            north = shortened(stroke[0] - take(places, i, NORTH))
+            east = shortened(stroke[1] - take(places, i, EAST))
             share = -(north * along_n + east * along_e) * per_square
             share = most(0.0, least(1.0, share))
             north, east = north + share * along_n, east + share * along_e
@@ -93,7 +97,7 @@ def find_walls(vehicles: Any, tile: Any, n: int, contacts: Any, bodies: Any) -> 
                 per = 1.0 / most(distance, CENTRED_M)
                 nn = where(distance >= CENTRED_M, north * per, 1.0)
                 bodies[n, 0], bodies[n, 1] = i, ground
-                enter(vehicles, tile, i, ground, 0.0, nn, east * per, gap, contacts, n)
+                enter(vehicles, tile, places, i, ground, 0.0, nn, east * per, gap, contacts, n)
                 n += 1
     return n
 
@@ -102,6 +106,7 @@ def find_walls(vehicles: Any, tile: Any, n: int, contacts: Any, bodies: Any) -> 
 def enter(
     vehicles: Any,
     tile: Any,
+    places: Any,
     i: int,
     j: int,
     rim_j: float,
@@ -129,7 +134,7 @@ def enter(
     put(tile, ground, BUSY, where(near, 1.0, take(tile, ground, BUSY)))
     if anywhere(gap < 0.0):
         apart = CORRECTION * most(-gap, 0.0) * mass
-        put(tile, i, NORTH, take(tile, i, NORTH) - nn * (apart * light_i))
-        put(tile, i, EAST, take(tile, i, EAST) - ne * (apart * light_i))
-        put(tile, j, NORTH, take(tile, j, NORTH) + nn * (apart * light_j))
-        put(tile, j, EAST, take(tile, j, EAST) + ne * (apart * light_j))
+        shift(places, i, NORTH, -nn * (apart * light_i))
+        shift(places, i, EAST, -ne * (apart * light_i))
+        shift(places, j, NORTH, nn * (apart * light_j))
+        shift(places, j, EAST, ne * (apart * light_j))

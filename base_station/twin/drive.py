@@ -59,16 +59,17 @@ HEADING_P, RATE_MAX, TURN_ACCEL, RATE_FF, RATE_P, RATE_I = range(6, 12)
 
 
 @compiled
-def take_commands(vehicles: Any, tile: Any, lane: int, setpoints: Any, driven: Any) -> None:
-    """Put set-points [V, 3] into effect; HOLD (not driven) forgets set-point and integrals."""
+def take_commands(vehicles: Any, tile: Any, lane: int, setpoints: Any, driven: Any, b: int) -> None:
+    """Put row b of set-points [B, V, 3] into effect; HOLD (not driven [B, V]) forgets set-point
+    and integrals."""
     for v in range(tile.shape[0] - 1):
         north = east = 0.0
-        tile[v, DRIVEN, lane] = driven[v]
-        if driven[v]:
-            speed = math.hypot(setpoints[v, 0], setpoints[v, 1])
+        tile[v, DRIVEN, lane] = driven[b, v]
+        if driven[b, v]:
+            north, east, yaw = setpoints[b, v, 0], setpoints[b, v, 1], setpoints[b, v, 2]
+            speed = math.sqrt(north * north + east * east)
             share = min(1.0, vehicles.speed_limit_mps[v] / max(speed, TINY))
-            north, east = setpoints[v, 0] * share, setpoints[v, 1] * share
-            yaw = setpoints[v, 2]
+            north, east = north * share, east * share
             if vehicles.heading_first[v]:
                 if not math.isnan(yaw):
                     tile[v, SP_YAW, lane] = yaw

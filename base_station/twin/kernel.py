@@ -16,8 +16,18 @@ from base_station.twin.drive import drive, take_commands, wrapped
 from base_station.twin.lanes import LANES, put, take
 from base_station.twin.search import CELLS_ABOVE, all_pairs, near_pairs, pair_capacity
 from base_station.twin.solve import solve_contacts
-from base_station.twin.state import EAST, NORTH, STATE_SIZE, V_EAST, V_NORTH, YAW, YAW_RATE
-from base_station.twin.tile import COLUMNS, FRICTION, aligned, face, gather
+from base_station.twin.state import (
+    EAST,
+    HELD_NORTH,
+    NORTH,
+    SP_NORTH,
+    STATE_SIZE,
+    V_EAST,
+    V_NORTH,
+    YAW,
+    YAW_RATE,
+)
+from base_station.twin.tile import COLUMNS, FRICTION, aligned, face, gather, shift
 
 
 @inlined
@@ -33,6 +43,8 @@ def advance_all(
     walls: Any,
     tile: Any,
     columns: Any,
+    places: Any,
+    spots: Any,
     contacts: Any,
     rows: Any,
     locked: bool,
@@ -51,58 +63,72 @@ def advance_all(
     bodies = np.empty((contacts.shape[0], 2), np.uintp)
     same = draws == 1 and lanes % hypotheses == 0  # every tile has the same constants
     for first in range(0, batch, lanes):
-        for lane in range(lanes):
-            b = min(first + lane, batch - 1)  # lanes past the end repeat the last row
-            draw[lane], hypothesis[lane] = b * draws // batch, b % hypotheses
-            tile[count, FRICTION, lane] = parameters.friction[draw[lane]]
-            due[lane] = min(round(parameters.latency_s[draw[lane]] / vehicles.dt_s), steps)
-            load(states[b], tile, lane)
+        load(states, first, tile, places)
         if first == 0 or not same:
+            for lane in range(lanes):
+                b = min(first + lane, batch - 1)
+                draw[lane], hypothesis[lane] = b * draws // batch, b % hypotheses
+                tile[count, FRICTION, lane] = parameters.friction[draw[lane]]
+                due[lane] = min(round(parameters.latency_s[draw[lane]] / vehicles.dt_s), steps)
             gather(vehicles, parameters, faults, draw, hypothesis, tile)
         face(columns)
         for step in range(steps + 1):
             for lane in range(lanes):
                 if due[lane] == step:  # a latency longer than the call is cut to it
                     b = min(first + lane, batch - 1)
-                    take_commands(vehicles, tile, lane, setpoints[b], driven[b])
+                    take_commands(vehicles, tile, lane, setpoints, driven, b)
             if step == steps:
                 break
             for v in range(count):
                 drive(vehicles, columns, v, locked)
             if count > CELLS_ABOVE:
-                found = near_pairs(tile, vehicles.radius_m, vehicles.reach_m, pairs)
-            between = find_pairs(vehicles, columns, pairs, found, rows, bodies)
-            n = find_walls(vehicles, columns, between, rows, bodies)
+                found = near_pairs(places, vehicles.radius_m, vehicles.reach_m, pairs)
+            between = find_pairs(vehicles, columns, spots, pairs, found, rows, bodies)
+            n = find_walls(vehicles, columns, spots, between, rows, bodies)
             if n > 0:
                 solve_contacts(vehicles, columns, rows, bodies, between, n, locked)
                 note_contacts(contacts, bodies, n, first, impulses, walls)
-            move(columns, vehicles.dt_s, locked)
+            move(columns, spots, vehicles.dt_s, locked)
             if not locked:
                 face(columns)
-        for lane in range(min(lanes, batch - first)):
-            store(tile, lane, states[first + lane])
+        store(tile, places, states, first, locked)
 
 
 @compiled
-def load(state: Any, tile: Any, lane: int) -> None:
-    for v in range(state.shape[0]):
-        for column in range(STATE_SIZE):
-            tile[v, column, lane] = state[v, column]
-        tile[v, YAW, lane] = (state[v, YAW] + math.pi) % (2.0 * math.pi) - math.pi
+def load(states: Any, first: int, tile: Any, places: Any) -> None:
+    """Rows from `first` on into the lanes; those past the end repeat the last row."""
+    for lane in range(tile.shape[2]):
+        b = min(first + lane, states.shape[0] - 1)
+        for v in range(states.shape[1]):
+            places[v, NORTH, lane], places[v, EAST, lane] = states[b, v, NORTH], states[b, v, EAST]
+            for column in range(V_NORTH, STATE_SIZE):
+                tile[v, column, lane] = states[b, v, column]
+            yaw = states[b, v, YAW]
+            if not -math.pi <= yaw < math.pi:
+                yaw = (yaw + math.pi) % (2.0 * math.pi) - math.pi
+            tile[v, YAW, lane] = yaw
 
 
 @compiled
-def store(tile: Any, lane: int, state: Any) -> None:
-    for v in range(state.shape[0]):
-        for column in range(STATE_SIZE):
-            state[v, column] = tile[v, column, lane]
+def store(tile: Any, places: Any, states: Any, first: int, locked: bool) -> None:
+    """What nobody has changed stays as it was, to the last digit: yaw when locked, held reports."""
+    for lane in range(min(tile.shape[2], states.shape[0] - first)):
+        b = first + lane
+        for v in range(states.shape[1]):
+            states[b, v, NORTH], states[b, v, EAST] = places[v, NORTH, lane], places[v, EAST, lane]
+            if not locked:
+                states[b, v, YAW] = tile[v, YAW, lane]
+            for column in range(V_NORTH, HELD_NORTH):
+                states[b, v, column] = tile[v, column, lane]
+            for column in range(SP_NORTH, STATE_SIZE):
+                states[b, v, column] = tile[v, column, lane]
 
 
 @inlined
-def move(tile: Any, dt: float, locked: bool) -> None:
+def move(tile: Any, places: Any, dt: float, locked: bool) -> None:
     for v in range(tile.shape[0] - 1):
-        put(tile, v, NORTH, take(tile, v, NORTH) + take(tile, v, V_NORTH) * dt)
-        put(tile, v, EAST, take(tile, v, EAST) + take(tile, v, V_EAST) * dt)
+        shift(places, v, NORTH, take(tile, v, V_NORTH) * dt)
+        shift(places, v, EAST, take(tile, v, V_EAST) * dt)
         if not locked:
             put(tile, v, YAW, wrapped(take(tile, v, YAW) + take(tile, v, YAW_RATE) * dt))
 
@@ -146,8 +172,9 @@ def _side_by_side(version: int, locked: bool) -> Any:
         walls: Any,
     ) -> None:
         if version != 0:  # read, so that the cache knows it
-            tile = aligned(states.shape[1] + 1, COLUMNS, LANES)
-            contacts = aligned(room(vehicles), CONTACT_COLUMNS, LANES)
+            tile = aligned(states.shape[1] + 1, COLUMNS, LANES, np.float32)
+            places = aligned(states.shape[1] + 1, 2, LANES, np.float64)
+            contacts = aligned(room(vehicles), CONTACT_COLUMNS, LANES, np.float32)
             advance_all(
                 vehicles,
                 parameters,
@@ -160,6 +187,8 @@ def _side_by_side(version: int, locked: bool) -> Any:
                 walls,
                 tile,
                 tile,
+                places,
+                places,
                 contacts,
                 contacts,
                 locked,
@@ -182,8 +211,9 @@ def _alone(version: int, locked: bool) -> Any:
     ) -> None:
         if version != 0:  # read, so that the cache knows it
             blocks, capacity = states.shape[1] + 1, room(vehicles)
-            tile = aligned(blocks, COLUMNS, 1)
-            contacts = aligned(capacity, CONTACT_COLUMNS, 1)
+            tile = aligned(blocks, COLUMNS, 1, np.float64)
+            places = aligned(blocks, 2, 1, np.float64)
+            contacts = aligned(capacity, CONTACT_COLUMNS, 1, np.float64)
             advance_all(
                 vehicles,
                 parameters,
@@ -196,6 +226,8 @@ def _alone(version: int, locked: bool) -> Any:
                 walls,
                 tile,
                 tile.reshape(blocks, COLUMNS),
+                places,
+                places.reshape(blocks, 2),
                 contacts,
                 contacts.reshape(capacity, CONTACT_COLUMNS),
                 locked,
