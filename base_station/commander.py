@@ -18,6 +18,7 @@ LATE, ANSWERED_S = 3.0, 0.2  # until no answer comes any more: standard deviatio
 SURE = 0.7  # of the round trip: it varies
 SURE_BEATS = 2
 TAKEOVER_S = 2.5  # longer than two heartbeats: a late one must not look like a takeover
+HEARD_S, UNHEEDED_S = 1.0, 30.0  # of one that is heard, and does not say that it stands
 
 
 @dataclass(frozen=True)
@@ -28,11 +29,13 @@ class _Sent:
     time_s: float = float("-inf")
     asked_s: float = float("-inf")  # the first time
     before_s: float = float("-inf")  # when another mode was asked for last
+    early_beats: int = 0  # of this mode, from when the order before might still come
     confirmed: bool = False
     obeyed: bool = False  # it has been in a mode of ours
     was_armed: bool = False
     sticks_us: tuple[int, ...] = ()  # where a pilot's sticks were at first
     strayed_since_s: float | None = None
+    unheeded_since_s: float | None = None  # heard since then, and not known to stand as told
 
 
 class Commander:
@@ -63,8 +66,7 @@ class Commander:
         """
         sent, trip_s = self._sent[index], track.round_trip_s
         soon = time_s - sent.asked_s < SURE * trip_s - 1.0 / self._rate_hz
-        late_s = trip_s + LATE * track.jitter_s + ANSWERED_S
-        return None if soon or time_s - sent.before_s < late_s else sent.mode
+        return None if soon or _may_come_yet(sent, track, time_s) else sent.mode
 
     def carry_out(self, orders: Orders, tracks: list[Track], time_s: float) -> list[Command]:
         """Mode changes where the mode is not what it should be, and set-points where driven.
@@ -79,6 +81,7 @@ class Commander:
             if self._is_strayed(i, driven, tracks[i].status, time_s):
                 continue
             commands += self._mode(i, member.sysid, driven, tracks[i], time_s)
+            self._note_unheeded(i, driven, tracks[i], time_s)
             sent = self._sent[i]
             goes_on = not sent.confirmed and sent.before_s > float("-inf")
             if driven or goes_on or self.autopilots[i].needs_setpoints_first:
@@ -95,9 +98,14 @@ class Commander:
         sent = self._sent[index]
         changed = sent.mode != wanted
         if status.mode == wanted and not changed:
-            if status.mode_beats >= SURE_BEATS:
+            early = 0 if sent.early_beats > status.mode_beats else sent.early_beats  # it left, too
+            if _may_come_yet(sent, track, time_s):
+                self._sent[index] = replace(sent, early_beats=status.mode_beats)
+            elif status.mode_beats - early >= SURE_BEATS:
                 self._sent[index] = replace(sent, confirmed=True)
             return []
+        early = status.mode_beats if status.mode == wanted and sent.mode is not None else 0
+        sent = self._sent[index] = replace(sent, early_beats=early)
         repeat_s = max(REPEAT_S, 1.5 * track.round_trip_s)
         if not changed and (sent.confirmed or time_s - sent.time_s < repeat_s):
             return []  # one that was in it and has left is not argued with
@@ -105,7 +113,7 @@ class Commander:
         self._sent[index] = replace(
             sent, mode=wanted, time_s=time_s, asked_s=asked_s, before_s=before_s, confirmed=False
         )
-        return [SetMode(sysid, wanted)] * _copies(track.loss(time_s, 1.0 / self._rate_hz))
+        return [SetMode(sysid, wanted)] * copies(track.loss(time_s, 1.0 / self._rate_hz))
 
     def _is_strayed(self, index: int, driven: bool, status: Status, time_s: float) -> bool:
         """Whether somebody else has this vehicle: it gets no command while that may be so.
@@ -135,6 +143,23 @@ class Commander:
         )
         return strayed
 
+    def _note_unheeded(self, index: int, driven: bool, track: Track, time_s: float) -> None:
+        sent = self._sent[index]
+        heard = time_s - track.newest_s() < HEARD_S
+        waits = heard and not driven and not sent.confirmed and track.status.mode != sent.mode
+        since_s = time_s if sent.unheeded_since_s is None else sent.unheeded_since_s
+        self._sent[index] = replace(sent, unheeded_since_s=since_s if waits else None)
+
+    def unheeding(self, time_s: float) -> list[int]:
+        """Vehicles that are heard, were told to stand, and for long have not said that they do."""
+        return [
+            i
+            for i, sent in enumerate(self._sent)
+            if i not in self.released
+            and sent.unheeded_since_s is not None
+            and time_s - sent.unheeded_since_s >= UNHEEDED_S
+        ]
+
     def all_holding(self, tracks: list[Track]) -> bool:
         """Everybody armed, and in the mode in which it stands."""
         return all(
@@ -161,7 +186,13 @@ class Commander:
         ]
 
 
-def _copies(loss: float) -> int:
+def _may_come_yet(sent: _Sent, track: Track, time_s: float) -> bool:
+    """Whether the order before the last, or an answer to it, may still be under way."""
+    late_s = track.round_trip_s + LATE * track.jitter_s + ANSWERED_S
+    return time_s - sent.before_s < late_s
+
+
+def copies(loss: float) -> int:
     """How often to send what must arrive: until it moves on, a vehicle does what it did before."""
     return 1 if loss < LOSSY else 1 + round(math.log(MISSED) / math.log(min(loss, 0.5)))
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from base_station.autopilots import Rate
 from base_station.belief import doubt as doubts
-from base_station.commander import Commander
+from base_station.commander import UNHEEDED_S, Commander, copies
 from base_station.commands import AskTime, Command, Drive, Heartbeat
 from base_station.desk import Desk
 from base_station.execution import Orders
@@ -175,13 +175,18 @@ class Station:
     def _keep_alive(self, wall_s: float) -> list[Command]:
         commands: list[Command] = []
         firsts, fleet_s = self.desk.view.first_on_each_link, self.desk.time_s
-        if max(wall_s - self._beats_s[0], fleet_s - self._beats_s[1]) >= HEARTBEAT_S:
+        every_s = HEARTBEAT_S / copies(self._worst_loss())  # or failsafes stop who misses a few
+        if max(wall_s - self._beats_s[0], fleet_s - self._beats_s[1]) >= every_s:
             self._beats_s = (wall_s, fleet_s)
             commands += [Heartbeat(m.sysid) for m in firsts]
         if max(wall_s - self._asked_time_s[0], fleet_s - self._asked_time_s[1]) >= TIMESYNC_S:
             self._asked_time_s = (wall_s, fleet_s)
             commands += [AskTime(m.sysid, int(wall_s * 1e9)) for m in firsts]
         return commands
+
+    def _worst_loss(self) -> float:
+        fleet = self.desk.fleet
+        return max(t.loss(self.desk.time_s, fleet.period_s) for t in fleet.tracks)
 
     def _tick(self, frame: Frame) -> list[Command]:
         desk = self.desk
@@ -200,6 +205,7 @@ class Station:
             self._take_alarms(alarms)
         self._note_contacts(frame)
         self._let_go_of_the_taken(frame)
+        self._give_up_the_unheeding(frame)
         if self._gap is None:
             self._mind_the_time()
             desk.orders = self._decide(desk, frame)
@@ -266,6 +272,12 @@ class Station:
                 self.desk.stop("takeover")
             else:  # there is somebody who can give it back
                 self._open_gap(frame.time_s)
+
+    def _give_up_the_unheeding(self, frame: Frame) -> None:
+        """Nothing is concluded before all stand: one that never does must not keep the others."""
+        if not self.desk.ended and (who := self._commander.unheeding(frame.time_s)):
+            names = ", ".join(self.desk.view.fleet[i].name for i in who)
+            self.desk.stop(f"cannot tell: {names} was told to hold for {UNHEEDED_S:.0f} s, in vain")
 
     def _mind_the_links(self, wall_s: float) -> None:
         """A vehicle that is not heard is waited for, and only then given up: radios fade."""

@@ -25,6 +25,7 @@ from hil.faults import Type, Unit
 Array = NDArray[np.float64]
 
 ACROSS = 1.0  # a heading off by MODEL_ERROR (6 degrees) takes so much of a motion to the other axis
+PASSIVE_AT_MOST = 0.9  # for one explanation, from ordinary driving by a troubled link
 FLOOR = 1e-3  # 'something else' is never ruled out before an experiment
 
 
@@ -148,10 +149,15 @@ def awake(doubt: Doubt) -> Doubt:
     return replace(doubt, prior=weights + doubt.prior - doubt.log_weights)
 
 
-def halved(doubt: Doubt) -> Doubt:
-    """Half the evidence so far, as log weights: that of ordinary driving by a troubled link, where
-    errors of one cause were counted as many."""
+def questioned(doubt: Doubt) -> Doubt:
+    """What ordinary driving by a troubled link has told: half the evidence so far, as log weights,
+    for errors of one cause were counted as many; and not enough to decide without an experiment."""
     weights = 0.5 * np.log(doubt.posterior + 1e-300)
+    p = diagnosis.posterior(weights)
+    best = np.arange(len(p)) == p.argmax()
+    odds, most = p[best].sum() / p[~best].sum(), PASSIVE_AT_MOST / (1.0 - PASSIVE_AT_MOST)
+    if odds > most:
+        weights = weights - np.where(best, np.log(odds / most), 0.0)
     return replace(doubt, prior=weights + doubt.prior - doubt.log_weights)
 
 

@@ -1,7 +1,8 @@
 """From an alarm to a doubt: the memory replayed under every hypothesis.
 
-When exactly the fault struck is unknown, as gains and sizes are: each draw of a hypothesis has its
-own moment of onset between the last quiet one and the alarm.
+When exactly the fault struck is unknown, as gains and sizes are, and where the fleet was before it:
+each draw of a hypothesis has its own moment of onset between the last quiet one and the alarm, and
+begins where one of the ensemble of believed twins was.
 """
 
 from collections.abc import Sequence
@@ -51,7 +52,8 @@ class Hindsight:
         )
         self._sound = baseline.faults([Hypothesis(NONE, h.sysid, 1.0) for h in twins[:1]])
         self._active = np.zeros(rows, dtype=np.bool_)
-        states = np.repeat(first.state[None], rows, axis=0)
+        members = first.states[np.arange(particles.DRAWS) % len(first.states)]
+        states = np.repeat(members, len(twins), axis=0)
         there_m = twin.report(states, drawn.motion)[:, suspect]
         self._rows = Doubt(
             baseline=baseline,

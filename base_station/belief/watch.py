@@ -36,11 +36,12 @@ MEMORY_S = 60.0
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """One tick of the memory: what arrived, the orders before it, and the twin after it [V, S]."""
+    """One tick of the memory: what arrived, the orders before it, and the ensemble of twins after
+    it [M, V, S]."""
 
     frame: Frame
     orders: Orders
-    state: Array
+    states: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +155,7 @@ class Watch:
         slowness = 1.0 + self._noise_m / NOISY_M
         gain = self._period_s / (CORRECTION_TIME_S * slowness)
         self._observer = observer.drawn(expected, frame, self._trusted, gain)
-        self.memory.append(Moment(frame, orders, self.state))
+        self.memory.append(Moment(frame, orders, self._observer.states))
         return tuple(int(v) for v in np.flatnonzero(self.cusum.level.max(axis=1) > self.threshold))
 
     def restart(self, at_rest: Frame) -> None:

@@ -30,7 +30,7 @@ def settle(desk: Desk, phase: Settling, frame: Frame) -> Orders:
         return desk.hold()
     opened = phase.hindsight.doubt()
     if hearing.trouble(frame, desk.fleet.period_s).any():
-        opened = doubts.halved(opened)
+        opened = doubts.questioned(opened)
     member = desk.view.fleet[opened.suspect]
     desk.doubt = doubts.anchor(opened, desk.mean_report_m())
     posterior = opened.verdict(desk.view.diagnosis.decide_at).posterior

@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from base_station.commander import SURE_BEATS, TAKEOVER_S, Commander
+from base_station.commander import SURE_BEATS, TAKEOVER_S, UNHEEDED_S, Commander
 from base_station.commands import Arm, Drive, SetMode
 from base_station.execution import hold
-from base_station.receiving.telemetry import Track
+from base_station.receiving.telemetry import Sample, Track
 from hil.mavlink import RoverMode
 from hil.scenario import StationView
 
@@ -157,3 +157,45 @@ def test_an_autopilot_that_wants_setpoints_first_gets_them_while_it_holds(
     assert [c for c in commands if isinstance(c, Drive)] == [
         Drive(sysid, 1.0, 0.0, 0.0, None) for sysid in (1, 2, 3)
     ]
+
+
+def test_an_order_that_may_still_be_under_way_is_waited_for_before_a_mode_counts(
+    rescue_view: StationView,
+) -> None:
+    """A copy of the order before comes late: it is put right, and nobody has taken anything."""
+    commander, driving, holding = Commander(rescue_view), _drive_first(), _tracks(RoverMode.HOLD)
+    late = _tracks(RoverMode.HOLD)
+    late[0].status = replace(late[0].status, mode=int(RoverMode.GUIDED))
+    for tracks in (holding, late):
+        for track in tracks:
+            track.answered(1.0)
+    commander.carry_out(driving, late, 0.0)
+    commander.carry_out(hold(3), holding, 0.5)
+    commander.carry_out(hold(3), holding, 1.0)  # GUIDED may come until 1.2 s
+    assert SetMode(1, RoverMode.HOLD) in commander.carry_out(hold(3), late, 2.1)
+    assert commander.takeovers(2.1 + TAKEOVER_S) == []
+
+
+def test_one_that_is_heard_and_never_holds_is_given_up(rescue_view: StationView) -> None:
+    commander, tracks = Commander(rescue_view), _tracks(RoverMode.GUIDED)
+    commander.carry_out(_drive_first(), tracks, 0.0)
+    for tenth in range(1, 10 * int(UNHEEDED_S) + 20):
+        for track in tracks:
+            track.position(Sample(0.1 * tenth, (0.0, 0.0), (0.0, 0.0)))
+        commander.carry_out(hold(3), tracks, 0.1 * tenth)
+        if tenth == 10 * int(UNHEEDED_S) - 10:
+            assert commander.unheeding(0.1 * tenth) == []
+    assert commander.unheeding(0.1 * tenth) == [0, 1, 2]
+
+
+def test_heartbeats_from_before_an_order_do_not_confirm_it(rescue_view: StationView) -> None:
+    """HOLD and GUIDED again at once: HOLD comes last, and the vehicle that stays in it is told."""
+    commander, tracks = Commander(rescue_view), _tracks(RoverMode.GUIDED, beats=9)
+    late = _tracks(RoverMode.GUIDED, beats=9)
+    late[0].status = replace(late[0].status, mode=int(RoverMode.HOLD), mode_beats=2)
+    for time_s, orders in ((0.0, _drive_first()), (1.0, hold(3)), (1.1, _drive_first())):
+        commander.carry_out(orders, tracks, time_s)
+    for tenth in (12, 13, 14, 15):
+        commander.carry_out(_drive_first(), tracks, 0.1 * tenth)
+    assert SetMode(1, RoverMode.GUIDED) in commander.carry_out(_drive_first(), late, 2.5)
+    assert commander.takeovers(2.5 + TAKEOVER_S) == []

@@ -1,5 +1,7 @@
 """Doubt and diagnosis against a fleet made of the twin itself, whose fault is therefore known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -242,3 +244,16 @@ def test_nominal_has_no_fault(rescue_view: StationView) -> None:
     rows = twin.fault_rows(twin.FleetModel.from_view(rescue_view), [nominal(1)])
     assert rows.power.all()
     assert not rows.gps_stuck.any()
+
+
+def test_ordinary_driving_by_a_troubled_link_decides_nothing(rescue_view: StationView) -> None:
+    """The order of what is likely stays; how likely does not."""
+    _, watch, _ = _probe(rescue_view, "gps_east_stuck")
+    sure = _open(rescue_view, watch)
+    weights = np.where(np.arange(len(sure.hypotheses)) == 1, 0.0, -50.0 - 1.0 * sure.log_weights)
+    sure = replace(sure, prior=sure.prior + weights - sure.log_weights)
+    asked = doubts.questioned(sure)
+    assert sure.posterior.max() > 0.999
+    assert asked.posterior.max() == pytest.approx(doubts.PASSIVE_AT_MOST)
+    assert asked.posterior.argsort().tolist() == sure.posterior.argsort().tolist()
+    assert doubts.questioned(asked).posterior.max() < doubts.PASSIVE_AT_MOST
