@@ -21,6 +21,7 @@ from base_station.belief.watch import Baseline, Moment
 Array = NDArray[np.float64]
 
 ONSET_MARGIN_S = 1.0  # a fault may have been there before the statistic moved
+UNNOTICED_S = 20.0  # and for so long where the link is at its worst: a wide spread hides much
 TRAIL_S = 1.6  # longer than the longest delay that a hypothesis has
 
 
@@ -40,7 +41,9 @@ class Hindsight:
         twins = [h for h in hypotheses if h.has_twin]
         self._period_s = period_s
         times = np.array([m.frame.time_s for m in memory])
-        start = int(np.searchsorted(times, between_s[0] - ONSET_MARGIN_S)) - 1
+        troubled = float(hearing.trouble(memory[-1].frame, period_s).max()) / hearing.WORST
+        margin_s = ONSET_MARGIN_S + UNNOTICED_S * troubled
+        start = int(np.searchsorted(times, between_s[0] - margin_s)) - 1
         first = memory[max(0, start)]
         sent = [(m.orders, m.frame) for m in memory[: max(0, start) + 1]]
         rng = np.random.default_rng(round(between_s[1] * 1000))
