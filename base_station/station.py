@@ -10,38 +10,25 @@ from dataclasses import dataclass, replace
 
 from base_station.autopilots import Rate
 from base_station.belief import doubt as doubts
-from base_station.commander import UNHEEDED_S, Commander, copies
-from base_station.commands import AskTime, Command, Drive, Heartbeat
+from base_station.commander import UNHEEDED_S, Commander
+from base_station.commands import Command, Drive
 from base_station.desk import Desk
 from base_station.execution import Orders
 from base_station.field.safety import Held, permitted
 from base_station.gaps import GAP_S, Gap, bridge, out_of_touch_since_s
-from base_station.phases import (
-    Arming,
-    Concluding,
-    Connecting,
-    Experimenting,
-    OnMission,
-    PlanningAlpha,
-    PlanningBeta,
-    Probing,
-    Returning,
-    Settling,
-)
+from base_station.keeping_alive import KeepAlive
+from base_station.phases import Arming, Connecting, OnMission, Returning
 from base_station.planning.requests import PlanReady, PlanRequest
 from base_station.receiving.fleet import LINK_GIVEN_UP_WALL_S, LINK_LOST_WALL_S
 from base_station.receiving.preparing import Preparation
 from base_station.receiving.telemetry import Frame
 from base_station.records import Event, Snapshot
 from base_station.snapshots import snapshot
-from base_station.steps.diagnosing import await_alpha, conclude, experiment, settle
-from base_station.steps.probing import get_ready, probe
-from base_station.steps.travelling import await_beta, drive, go_home
+from base_station.steps import deciding
+from base_station.steps.probing import get_ready
 from hil import mavlink
 from hil.scenario import StationView
 
-HEARTBEAT_S = 1.0
-TIMESYNC_S = 1.0
 ABSENT_S = 1.0  # of wall time between two steps: the station itself was not running
 CONTACT_GAP_S = 1.0  # two touches of a pair closer in time than this are one
 
@@ -75,7 +62,7 @@ class Station:
         wants: tuple[Rate, ...] = (),
     ) -> None:
         self.desk = Desk(view)
-        self._decide, self._get_ready = decide or own_decision, ready or self._arm_prepared
+        self._decide, self._get_ready = decide or deciding.decide, ready or self._arm_prepared
         self._commander = Commander(view)
         self.autopilots = self._commander.autopilots
         self._preparations = [
@@ -84,8 +71,7 @@ class Station:
         ]
         self._touched_s: dict[tuple[int, int], float] = {}
         self._held: frozenset[Held] = frozenset()
-        self._beats_s = (float("-inf"), float("-inf"))  # last heartbeat: wall, fleet
-        self._asked_time_s = (float("-inf"), float("-inf"))  # last TIMESYNC: wall, fleet
+        self._keep_alive = KeepAlive(view.first_on_each_link)
         self._stepped_wall_s: float | None = None
         self._silent: frozenset[int] = frozenset()  # vehicles that have not been heard for long
         self._gap: Gap | None = None
@@ -116,7 +102,7 @@ class Station:
             self._note(index, message)
         desk.time_s = max(desk.time_s, desk.fleet.newest_s)
         self._mind_the_links(wall_s)
-        commands += self._keep_alive(wall_s)
+        commands += self._keep_alive.due(wall_s, desk.time_s, desk.fleet.worst_loss(desk.time_s))
         if isinstance(desk.phase, Connecting | Arming):
             commands += self._prepare(wall_s)
             commands += self._get_ready(desk, self._commander)
@@ -171,22 +157,6 @@ class Station:
                 desk.say("text", f"{member.name}: {text}", sysid=member.sysid)
             case _:
                 pass
-
-    def _keep_alive(self, wall_s: float) -> list[Command]:
-        commands: list[Command] = []
-        firsts, fleet_s = self.desk.view.first_on_each_link, self.desk.time_s
-        every_s = HEARTBEAT_S / copies(self._worst_loss())  # or failsafes stop who misses a few
-        if max(wall_s - self._beats_s[0], fleet_s - self._beats_s[1]) >= every_s:
-            self._beats_s = (wall_s, fleet_s)
-            commands += [Heartbeat(m.sysid) for m in firsts]
-        if max(wall_s - self._asked_time_s[0], fleet_s - self._asked_time_s[1]) >= TIMESYNC_S:
-            self._asked_time_s = (wall_s, fleet_s)
-            commands += [AskTime(m.sysid, int(wall_s * 1e9)) for m in firsts]
-        return commands
-
-    def _worst_loss(self) -> float:
-        fleet = self.desk.fleet
-        return max(t.loss(self.desk.time_s, fleet.period_s) for t in fleet.tracks)
 
     def _tick(self, frame: Frame) -> list[Command]:
         desk = self.desk
@@ -301,28 +271,3 @@ def newest(commands: Sequence[Command]) -> tuple[Command, ...]:
     """Without the set-points that later ones of the same step overtake: nobody obeys old ones."""
     last = {c.sysid: c for c in commands if isinstance(c, Drive)}
     return tuple(c for c in commands if not isinstance(c, Drive) or c is last[c.sysid])
-
-
-def own_decision(desk: Desk, frame: Frame) -> Orders:
-    """What the step that the phase belongs to decides."""
-    if desk.alarmed and isinstance(desk.phase, PlanningBeta | OnMission | Returning):
-        desk.suspect_the_worst()
-    match desk.phase:
-        case Probing() as phase:
-            return probe(desk, phase, frame)
-        case Settling() as phase:
-            return settle(desk, phase, frame)
-        case PlanningAlpha() as phase:
-            return await_alpha(desk, phase)
-        case Experimenting() as phase:
-            return experiment(desk, phase, frame)
-        case Concluding() as phase:
-            return conclude(desk, phase, frame)
-        case PlanningBeta(number=number):
-            return await_beta(desk, number, frame)
-        case OnMission() as phase:
-            return drive(desk, phase, frame)
-        case Returning() as phase:
-            return go_home(desk, phase, frame)
-        case _:
-            return desk.hold()

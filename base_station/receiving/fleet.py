@@ -43,6 +43,10 @@ class Fleet:
     def period_s(self) -> float:
         return 1.0 / self.view.clock.telemetry_hz
 
+    def worst_loss(self, time_s: float) -> float:
+        """The share of reports that the worst link loses."""
+        return max(track.loss(time_s, self.period_s) for track in self.tracks)
+
     def receive(self, index: int, message: mavlink.Received, wall_s: float) -> None:
         """Take in one message that arrived on vehicle `index`'s link."""
         member, track = self.view.fleet[index], self.tracks[index]
