@@ -17,12 +17,25 @@ from base_station.belief.diagnosis import ReportFaults
 from base_station.belief.doubt import Doubt, advanced
 from base_station.belief.hypotheses import NONE, Hypothesis
 from base_station.belief.watch import Baseline, Moment
+from base_station.execution import REST_S
 
 Array = NDArray[np.float64]
 
 ONSET_MARGIN_S = 1.0  # a fault may have been there before the statistic moved
 UNNOTICED_S = 20.0  # and for so long where the link is at its worst: a wide spread hides much
 TRAIL_S = 1.6  # longer than the longest delay that a hypothesis has
+
+
+def _begin_s(memory: Sequence[Moment], quiet_s: float, period_s: float) -> float:
+    """When a fault may have struck at the earliest; not before the fleet was last out of touch."""
+    certain_s = quiet_s - ONSET_MARGIN_S
+    troubled = float(hearing.trouble(memory[-1].frame, period_s).max()) / hearing.WORST
+    heard_s = [
+        m.frame.time_s + REST_S
+        for m in memory
+        if m.frame.time_s < certain_s and not m.frame.fresh.all()
+    ]
+    return min(certain_s, max([certain_s - UNNOTICED_S * troubled, *heard_s]))
 
 
 class Hindsight:
@@ -41,9 +54,7 @@ class Hindsight:
         twins = [h for h in hypotheses if h.has_twin]
         self._period_s = period_s
         times = np.array([m.frame.time_s for m in memory])
-        troubled = float(hearing.trouble(memory[-1].frame, period_s).max()) / hearing.WORST
-        margin_s = ONSET_MARGIN_S + UNNOTICED_S * troubled
-        start = int(np.searchsorted(times, between_s[0] - margin_s)) - 1
+        start = int(np.searchsorted(times, _begin_s(memory, between_s[0], period_s))) - 1
         first = memory[max(0, start)]
         sent = [(m.orders, m.frame) for m in memory[: max(0, start) + 1]]
         rng = np.random.default_rng(round(between_s[1] * 1000))
@@ -58,6 +69,7 @@ class Hindsight:
         members = first.states[np.arange(particles.DRAWS) % len(first.states)]
         states = np.repeat(members, len(twins), axis=0)
         there_m = twin.report(states, drawn.motion)[:, suspect]
+        said_m = np.asarray(first.frame.position_m[suspect])
         self._rows = Doubt(
             baseline=baseline,
             suspect=suspect,
@@ -69,7 +81,7 @@ class Hindsight:
             hearing=hearing.nothing_yet(particles.DRAWS, baseline.model.size, sent),
             fit=diagnosis.fresh_fit(rows),
             unknown=0.0,
-            last_report_m=np.asarray(first.frame.position_m[suspect]),
+            last_report_m=np.where(first.frame.fresh[suspect], said_m, there_m[0]),
             judged_s=first.frame.time_s,
         )
         self.time_s = first.frame.time_s  # of the last moment taken

@@ -13,7 +13,7 @@ from base_station.belief.diagnosis import SAMPLE_PERIOD_S
 from base_station.belief.hindsight import Hindsight
 from base_station.belief.hypotheses import Hypothesis, candidates, nominal
 from base_station.belief.particles import report_faults
-from base_station.belief.watch import Baseline, Watch
+from base_station.belief.watch import Baseline, Moment, Watch
 from base_station.execution import Orders, hold, plan_orders, probe_pulses, pulse_at, pulse_orders
 from base_station.receiving.telemetry import Frame
 from hil.scenario import StationView
@@ -95,16 +95,19 @@ def _probe(
         time_s += PERIOD_S
 
 
-def _open(view: StationView, watch: Watch) -> doubts.Doubt:
+def _open(
+    view: StationView, watch: Watch, memory: tuple[Moment, ...] | None = None
+) -> doubts.Doubt:
+    memory = tuple(watch.memory) if memory is None else memory
     hindsight = Hindsight(
         watch.baseline,
-        tuple(watch.memory),
+        memory,
         SUSPECT,
         candidates(view.fleet[SUSPECT], view.diagnosis.priors),
         (2.0, 12.0),
         PERIOD_S,
     )
-    while not hindsight.take(tuple(watch.memory), most=7):
+    while not hindsight.take(memory, most=7):
         pass
     return hindsight.doubt()
 
@@ -257,3 +260,20 @@ def test_ordinary_driving_by_a_troubled_link_decides_nothing(rescue_view: Statio
     assert asked.posterior.max() == pytest.approx(doubts.PASSIVE_AT_MOST)
     assert asked.posterior.argsort().tolist() == sure.posterior.argsort().tolist()
     assert doubts.questioned(asked).posterior.max() < doubts.PASSIVE_AT_MOST
+
+
+def test_a_report_that_is_missing_when_the_replay_begins_spoils_nothing(
+    rescue_view: StationView,
+) -> None:
+    _, watch, _ = _probe(rescue_view, "motor_y_off")
+    memory = []
+    for moment in watch.memory:
+        frame = moment.frame
+        if frame.time_s < 2.0:
+            there, fresh = frame.position_m.copy(), frame.fresh.copy()
+            there[SUSPECT], fresh[SUSPECT] = np.nan, False
+            frame = replace(frame, position_m=there, fresh=fresh)
+        memory.append(replace(moment, frame=frame))
+    doubt = _open(rescue_view, watch, tuple(memory))
+    assert doubt.posterior.sum() == pytest.approx(1.0)
+    assert np.argmax(doubt.posterior) == np.argmax(_open(rescue_view, watch).posterior)
