@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from base_station import execution, mission
 from base_station.belief.diagnosis import Verdict
 from base_station.belief.doubt import Doubt
+from base_station.belief.fixes import has_fix, seen_m
 from base_station.belief.hindsight import Hindsight
 from base_station.belief.hypotheses import Hypothesis, candidates
 from base_station.belief.watch import Watch
@@ -70,11 +71,18 @@ class Desk:
     def hold(self) -> Orders:
         return execution.hold(len(self.view.fleet))
 
-    def mean_report_m(self) -> Array:
-        """[V, 2] mean of the last second of reports of the fleet at rest."""
+    def mean_report_m(self, suspect: int | None = None) -> Array:
+        """[V, 2] mean of the last second of reports of the fleet at rest.
+
+        A suspect that is judged by its fixes is where the newest one is: those before it may be
+        from when it still rolled.
+        """
         count = round(1.0 / self.fleet.period_s)
-        recent = [moment.frame.position_m for moment in list(self.watch.memory)[-count:]]
-        return np.asarray(np.nanmean(recent, axis=0))
+        frames = [moment.frame for moment in list(self.watch.memory)[-count:]]
+        mean_m = np.asarray(np.nanmean([f.position_m for f in frames], axis=0))
+        if suspect is not None and has_fix(frames[-1], suspect):
+            mean_m[suspect] = seen_m(frames[-1], suspect)[suspect]
+        return mean_m
 
     def ask(
         self,

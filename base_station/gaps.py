@@ -73,7 +73,7 @@ def bridge(desk: Desk, gap: Gap, frame: Frame) -> None:
         desk.phase = _resumed(desk, gap, frame.time_s)
     desk.watch.restart(replace(frame, position_m=desk.mean_report_m()))
     if desk.doubt is not None:
-        desk.doubt = doubts.anchor(desk.doubt, desk.mean_report_m())
+        desk.doubt = doubts.anchor(desk.doubt, desk.mean_report_m(desk.doubt.suspect))
     if isinstance(desk.phase, OnMission):
         desk.mission_plans -= 1  # the one that was cut short does not count
         plan_from_here(desk)

@@ -129,7 +129,9 @@ class _Following:
                 settle(desk, phase, frame)
             case PlanningAlpha():
                 if self.moves(self._sent.at(frame.time_s + desk.fleet.period_s)):
-                    desk.doubt = doubts.anchor(doubts.awake(desk.open_doubt), desk.mean_report_m())
+                    desk.doubt = doubts.anchor(
+                        doubts.awake(desk.open_doubt), desk.mean_report_m(desk.open_doubt.suspect)
+                    )
                     desk.enter(Experimenting(_in_the_log(len(desk.view.fleet)), frame.time_s))
             case Experimenting(since_s=since_s):
                 if not moving and frame.time_s > since_s:

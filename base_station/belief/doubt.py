@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from base_station import twin
-from base_station.belief import diagnosis, hearing, observer, particles
+from base_station.belief import diagnosis, fixes, hearing, observer, particles
 from base_station.belief.diagnosis import Fit, ReportFaults, Verdict
 from base_station.belief.fixes import Fixes
 from base_station.belief.hearing import Hearing
@@ -182,29 +182,33 @@ def advanced(
     states = _move(doubt, motion, frame, heard, period_s)
     trail_m = np.roll(doubt.trail_m, -1, axis=0)
     trail_m[-1] = twin.report(states, motion)[:, suspect]
-    age = np.minimum(np.round(reports.lag_s / period_s).astype(np.intp), len(trail_m) - 2)
-    rows = np.arange(len(states))
-    now_m, before_m = trail_m[-1 - age, rows], trail_m[-2 - age, rows]
+    now_m, before_m = (_ago(trail_m, reports.lag_s + s, period_s) for s in (0.0, period_s))
     across_m = _across(doubt.states, states, suspect) * (motion.gps_stuck[:, suspect] < 0.5)
     fit = replace(doubt.fit, path_m=doubt.fit.path_m + np.abs(now_m - before_m) + across_m)
-    if frame.fix_m is not None and frame.lost is not None:
-        place_m, fix_m = frame.position_m[suspect], frame.fix_m[suspect]
-        doubt = replace(doubt, fixes=doubt.fixes.noted(place_m, fix_m, bool(frame.lost[suspect])))
-    since_s = frame.time_s - doubt.judged_s
+    doubt = replace(doubt, fixes=doubt.fixes.heard(frame, suspect))
+    seen_s = fixes.seen_s(frame, suspect)
+    since_s = seen_s - doubt.judged_s
     if since_s < diagnosis.SAMPLE_PERIOD_S - 1e-6 or not frame.fresh[suspect]:
         return replace(doubt, states=states, trail_m=trail_m, hearing=heard, fit=fit)
-    observed_m = frame.position_m[suspect]
+    observed_m = fixes.seen_m(frame, suspect)[suspect]
+    expected_m = _ago(trail_m, reports.lag_s + (frame.time_s - seen_s), period_s)
     gained = diagnosis.unknown_log_likelihood(observed_m, doubt.last_report_m)
     return replace(
         doubt,
         states=states,
         trail_m=trail_m,
         hearing=heard,
-        fit=diagnosis.judge(fit, observed_m, now_m, reports, since_s),
+        fit=diagnosis.judge(fit, observed_m, expected_m, reports, since_s),
         unknown=doubt.unknown + gained,
         last_report_m=observed_m,
-        judged_s=frame.time_s,
+        judged_s=seen_s,
     )
+
+
+def _ago(trail_m: Array, late_s: Array, period_s: float) -> Array:
+    """[R, 2] what each row expected `late_s` [R] ago, as far back as the trail goes."""
+    age = np.minimum(np.round(late_s / period_s).astype(np.intp), len(trail_m) - 1)
+    return np.asarray(trail_m[-1 - age, np.arange(len(age))])
 
 
 def _across(before: Array, after: Array, suspect: int) -> Array:

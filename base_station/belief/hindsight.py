@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 ONSET_MARGIN_S = 1.0  # a fault may have been there before the statistic moved
 UNNOTICED_S = 20.0  # and for so long where the link is at its worst: a wide spread hides much
-TRAIL_S = 1.6  # longer than the longest delay that a hypothesis has
+TRAIL_S = 1.8  # longer than the longest delay that a hypothesis has, and a fix is old
 
 
 def _begin_s(memory: Sequence[Moment], quiet_s: float, period_s: float) -> float:

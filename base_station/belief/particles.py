@@ -5,7 +5,7 @@ and the size of the fault. Rows [R = K x T], the twins running fastest, so that 
 draws as far as they can: what the draws do alike to all does not blur their comparison.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,7 +88,7 @@ def _with_sizes(
 ) -> Particles:
     sizes = _sizes(twins, share)
     rows = [h if np.isnan(s) else h.sized(s) for h, s in zip(twins * DRAWS, sizes, strict=True)]
-    reports = report_faults(rows, share, baseline.bounce_m)
+    reports = report_faults(rows, share)
     return Particles(twins, share, parameters, baseline.faults(rows), reports)
 
 
@@ -99,9 +99,7 @@ def _sizes(twins: tuple[Hypothesis, ...], share: Array) -> Array:
     return np.asarray(low + share * (high - low))
 
 
-def report_faults(
-    rows: Sequence[Hypothesis], share: Array, bounce_m: Mapping[int, float]
-) -> ReportFaults:
+def report_faults(rows: Sequence[Hypothesis], share: Array) -> ReportFaults:
     """What each of [R] does to the reports of its vehicle.
 
     How fast a vehicle's filter takes to a jump is unknown: `share` [R] of a range.
@@ -116,14 +114,12 @@ def report_faults(
             for h, w in zip(rows, where(kind), strict=True)
         ]
 
-    stuck = where(Type.STUCK)
-    bounce = [s * bounce_m.get(h.sysid, 0.0) for s, h in zip(stuck, rows, strict=True)]
     jump, (fast_s, slow_s) = np.array(where(Type.OFFSET)), SETTLING_S
     settling_s = fast_s + share * (slow_s - fast_s)
     drift_mps = np.where(where(Type.DRIFT), DRIFT_SIGMA_MPS, 0.0)
     return ReportFaults(
         drift_mps=np.where(jump, JUMP_SIGMA_M / settling_s, drift_mps),
         settling_s=np.where(jump, settling_s, np.inf),
-        noise_m=np.array(size(Type.NOISE)) + np.array(bounce),
+        noise_m=np.array(size(Type.NOISE)),
         lag_s=np.array(size(Type.DELAY)),
     )

@@ -6,14 +6,14 @@ the nominal twin before the drawing, in units of its predicted spread.
 """
 
 from collections import deque
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from base_station import twin
-from base_station.belief import detection, hearing, observer
+from base_station.belief import detection, fixes, hearing, observer
 from base_station.belief.hypotheses import NONE, Hypothesis
 from base_station.execution import Orders
 from base_station.fitted import residual_m
@@ -46,15 +46,10 @@ class Moment:
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """Everything that is taken for granted: the model, and the faults already established.
-
-    `bounce_m`: of vehicles (system ids) whose reports do not stand still when their fix does, the
-    sigma around it.
-    """
+    """Everything that is taken for granted: the model, and the faults already established."""
 
     model: twin.FleetModel
     known: tuple[Hypothesis, ...] = ()
-    bounce_m: Mapping[int, float] = field(default_factory=dict)
 
     def faults(self, hypotheses: Sequence[Hypothesis]) -> twin.FaultArrays:
         """[H] fault rows of `hypotheses`, each on top of what is known."""
@@ -91,9 +86,15 @@ class Baseline:
         return sigma_m
 
     def corrected(self, frame: Frame) -> Frame:
-        """The frame without the constant errors that are known."""
+        """The frame without the constant errors that are known.
+
+        Of a receiver that is known to be stuck its own word, not what an estimator makes of it.
+        """
         position_m = frame.position_m
         for hypothesis in self.known:
+            if hypothesis.kind == (Unit.GPS, Type.STUCK):
+                told = replace(frame, position_m=position_m)
+                position_m = fixes.seen_m(told, self.model.index(hypothesis.sysid))
             if hypothesis.fault and hypothesis.kind == (Unit.GPS, Type.OFFSET):
                 position_m = position_m.copy()
                 position_m[self.model.index(hypothesis.sysid)] -= hypothesis.fault.size[:2]

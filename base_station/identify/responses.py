@@ -147,8 +147,13 @@ class NoseFirst(Response):
             change = (setpoint if on else 0.0) - ahead
             ahead = ahead + _clip(change, helm.accel_mps2 * DT_S) if on else 0.0
             moving = on and not (ahead == 0.0 and abs(v) < helm.stop_mps)
-            i = _clip(i + helm.speed_i * DT_S * (ahead - v), 1.0) if moving else 0.0
-            wanted = helm.speed_ff * ahead + helm.speed_p * (ahead - v) + i if moving else 0.0
+            error = ahead - v
+            wanted = helm.speed_ff * ahead + helm.speed_p * error
+            slews = abs(_clip(wanted + i, 1.0) - throttle) > slew * DT_S
+            if not slews or error * i < 0.0:  # else the integral waits for the throttle
+                i = _clip(i + helm.speed_i * DT_S * error, 1.0)
+            i = i if moving else 0.0
+            wanted = wanted + i if moving else 0.0
             throttle += _clip(_clip(wanted, 1.0) - throttle, slew * DT_S)
             v += DT_S * stall * (throttle - v / self._free_mps)
             v = math.copysign(max(0.0, abs(v) - self._rolling * DT_S), v)

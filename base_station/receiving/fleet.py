@@ -10,7 +10,15 @@ from base_station.autopilots import adapter
 from base_station.fitted import latency_s
 from base_station.receiving.fleet_clock import FleetClock
 from base_station.receiving.local_origin import LocalOrigin
-from base_station.receiving.telemetry import Frame, Sample, Track, frame_at, note
+from base_station.receiving.telemetry import (
+    Fix,
+    Frame,
+    Receivers,
+    Sample,
+    Track,
+    frame_at,
+    note,
+)
 from hil import mavlink
 from hil.frames import wgs84_to_ned
 from hil.scenario import StationView
@@ -21,6 +29,8 @@ LINK_GIVEN_UP_WALL_S = 60.0
 ANSWER_WITHIN_S = 30.0  # a TIMESYNC answer to what was asked later than now, or long ago, is none
 JUST_HEARD_WALL_S = 0.5
 KEPT_REPORTS = 1024  # how far back it is known what had been heard
+FIX_LAG_S = 0.1  # a receiver tells where it was so long ago: what u-blox take at 5 Hz
+STALE_FIX_S = 5.0  # older than the newest report: its time is not that of the vehicle
 LONG_GAP_S = 6.0  # after that long without a command nothing moves: no need to tick through it
 
 
@@ -65,6 +75,10 @@ class Fleet:
             v_north, v_east, _ = value.velocity_mps
             track.position(Sample(time_s, (north, east), (v_north, v_east)))
             self._newest.append((wall_s, self.newest_s))
+        elif isinstance(value, mavlink.GpsRaw) and track.samples:
+            if value.fix_type >= mavlink.FixType.FIX_3D:
+                place_m = wgs84_to_ned(value.lat_deg, value.lon_deg, self.view.origin.origin())
+                track.fix(Fix(self._fix_time_s(index, value.time_s), place_m))
         elif isinstance(value, mavlink.Timesync) and value.tc1_ns:
             now_ns = int(wall_s * 1e9)
             if 0 <= now_ns - value.ts1_ns <= ANSWER_WITHIN_S * 1e9:
@@ -110,23 +124,33 @@ class Fleet:
             frame = frame_at(self.tracks, time_s, self.period_s, self.newest_s, driven)
             own_s = np.array([latency_s(m) for m in self.view.fleet])
             frame = replace(frame, delay_s=frame.delay_s + own_s)
-            frames.append(self._with_fixes(frame))
+            frames.append(self._with_receivers(frame))
             self._next_tick += 1
             if len(frames) == round(LONG_GAP_S / self.period_s):
                 newest = int((self.newest_s + 1e-3) / self.period_s)
                 self._next_tick = max(self._next_tick, newest)
         return frames
 
-    def _with_fixes(self, frame: Frame) -> Frame:
-        """What receivers and estimators say of themselves, where the view counts that."""
+    def _fix_time_s(self, index: int, told_s: float) -> float:
+        """When a vehicle was where its newest fix is; some receivers tell the time of day."""
+        newest_s, time_s = self.tracks[index].newest_s(), self.fleet_time_s(index, told_s)
+        return (time_s if abs(newest_s - time_s) <= STALE_FIX_S else newest_s) - FIX_LAG_S
+
+    def _with_receivers(self, frame: Frame) -> Frame:
+        """What receivers and estimators say of themselves, where the view counts that.
+
+        An estimate without an accelerometer in it is nothing but filtered fixes.
+        """
         if self.view.diagnosis.evidence == "position":
             return frame
-        origin, nowhere = self.view.origin.origin(), (float("nan"), float("nan"))
-        fixes = [t.status.fix_deg for t in self.tracks]
-        places_m = [wgs84_to_ned(*fix, origin) if fix else nowhere for fix in fixes]
-        pairs = zip(self.tracks, self._autopilots, strict=True)
-        lost = np.array([a.lost(t.status) for t, a in pairs])
-        return replace(frame, fix_m=np.array(places_m), lost=lost)
+        pairs = list(zip(self.tracks, self._autopilots, strict=True))
+        fixes = [None if a.estimate_lags else t.fix_at(frame.time_s) for t, a in pairs]
+        receivers = Receivers(
+            fix_m=np.array([f.position_m if f else (math.nan, math.nan) for f in fixes]),
+            fix_s=np.array([f.time_s if f else math.nan for f in fixes]),
+            lost=np.array([a.lost(t.status) for t, a in pairs]),
+        )
+        return replace(frame, receivers=receivers)
 
     def excuse(self, absent_s: float) -> None:
         """Silence of vehicles does not count while the station itself was not listening."""

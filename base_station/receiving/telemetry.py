@@ -33,6 +33,14 @@ class Sample:
 
 
 @dataclass(frozen=True)
+class Fix:
+    """GPS_RAW_INT: where its antenna was at fleet time; north and east (m)."""
+
+    time_s: float
+    position_m: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class Status:
     """The slow things a vehicle says of itself."""
 
@@ -46,9 +54,17 @@ class Status:
     gps_satellites: int = 0
     sticks_us: tuple[int, ...] = ()  # RC_CHANNELS 1 to 4, where a pilot has a transmitter
     gps_fix: int = 0  # GPS_FIX_TYPE
-    fix_deg: tuple[float, float] | None = None  # latitude, longitude of GPS_RAW_INT
     ekf_flags: int = 0  # EKF_STATUS_FLAGS
     prearm_ok: bool = False  # SYS_STATUS
+
+
+@dataclass(frozen=True, eq=False)
+class Receivers:
+    """What the receivers of a fleet say beside what its estimators make of it."""
+
+    fix_m: Array  # [V, 2] north, east; NaN where there is none, or none that counts
+    fix_s: Array  # [V] fleet time at which the vehicle was there
+    lost: NDArray[np.bool_]  # [V] the estimator says that it has no position
 
 
 @dataclass(frozen=True)
@@ -65,8 +81,7 @@ class Frame:
     delay_s: Array  # [V] from here until orders that answer it take effect, usually
     jitter_s: Array  # [V] standard deviation of that
     driven: NDArray[np.bool_]  # [V] since the frame before it was in a mode that takes set-points
-    fix_m: Array | None = None  # [V, 2] what the receivers say, where that counts
-    lost: NDArray[np.bool_] | None = None  # [V] the estimator says that it has no position
+    receivers: Receivers | None = None  # where they count
 
     @property
     def all_stand(self) -> bool:
@@ -80,6 +95,7 @@ class Track:
     def __init__(self) -> None:
         self.status = Status()
         self.samples: deque[Sample] = deque(maxlen=HISTORY)
+        self.fixes: deque[Fix] = deque(maxlen=HISTORY)
         self.last_heard_wall_s = float("-inf")
         self._round_trips_s: deque[float] = deque(maxlen=ROUND_TRIPS)
         self._modes: deque[tuple[float, int]] = deque(maxlen=HISTORY)
@@ -139,6 +155,14 @@ class Track:
                 )
         return None
 
+    def fix(self, fix: Fix) -> None:
+        if not self.fixes or fix.time_s > self.fixes[-1].time_s:
+            self.fixes.append(fix)
+
+    def fix_at(self, time_s: float) -> Fix | None:
+        """The newest fix not after `time_s`, however old."""
+        return next((f for f in reversed(self.fixes) if f.time_s <= time_s + 1e-3), None)
+
     def has(self, time_s: float, within_s: float) -> bool:
         """Whether there is a sample of about that time."""
         return any(abs(sample.time_s - time_s) <= within_s for sample in reversed(self.samples))
@@ -173,7 +197,6 @@ def note(status: Status, value: object, motors: int) -> Status:
                 status,
                 gps_satellites=value.satellites,
                 gps_fix=value.fix_type,
-                fix_deg=(value.lat_deg, value.lon_deg),
             )
         case mavlink.RcChannels():
             return replace(status, sticks_us=value.channels_us[:4])

@@ -6,6 +6,7 @@ from base_station import execution, mission
 from base_station.belief import doubt as doubts
 from base_station.belief import escalation, hearing
 from base_station.belief.diagnosis import Verdict
+from base_station.belief.fixes import has_fix
 from base_station.belief.hypotheses import NONE, UNKNOWN
 from base_station.belief.watch import Watch
 from base_station.desk import Desk
@@ -32,7 +33,7 @@ def settle(desk: Desk, phase: Settling, frame: Frame) -> Orders:
     if hearing.trouble(frame, desk.fleet.period_s).any():
         opened = doubts.questioned(opened)
     member = desk.view.fleet[opened.suspect]
-    desk.doubt = doubts.anchor(opened, desk.mean_report_m())
+    desk.doubt = doubts.anchor(opened, desk.mean_report_m(opened.suspect))
     posterior = opened.verdict(desk.view.diagnosis.decide_at).posterior
     desk.say("hypotheses", f"{member.name}: {_shown(posterior)}", posterior=posterior)
     desk.tries, desk.soloed = 0, False
@@ -87,7 +88,9 @@ def await_alpha(desk: Desk, phase: PlanningAlpha) -> Orders:
 def _begin(
     desk: Desk, plan: OpenLoopPlan, twins: tuple[str, ...], text: str, **data: object
 ) -> None:
-    desk.doubt = doubts.anchor(doubts.awake(desk.open_doubt), desk.mean_report_m())
+    desk.doubt = doubts.anchor(
+        doubts.awake(desk.open_doubt), desk.mean_report_m(desk.open_doubt.suspect)
+    )
     desk.say("plan", text, **data)
     desk.enter(Experimenting(plan, desk.time_s, twins))
 
@@ -132,7 +135,7 @@ def conclude(desk: Desk, phase: Concluding, frame: Frame) -> Orders:
         desk.phase = replace(phase, since_s=frame.time_s)
     elif frame.time_s - phase.since_s >= execution.REST_S:
         named = desk.open_doubt.verdict(desk.view.diagnosis.decide_at).decided
-        desk.doubt = doubts.anchor(desk.open_doubt, desk.mean_report_m())
+        desk.doubt = doubts.anchor(desk.open_doubt, desk.mean_report_m(desk.open_doubt.suspect))
         _escalate(desk, named)
     return desk.hold()
 
@@ -160,6 +163,10 @@ def _believe(desk: Desk, verdict: Verdict) -> None:
     memory, states = desk.watch.memory, doubt.of_twins()[0]
     desk.watch = Watch(desk.view, baseline, states[index], desk.time_s)
     desk.watch.memory.extend(memory)
+    newest = memory[-1].frame
+    if has_fix(newest, doubt.suspect):  # judged by its fixes, watched by its estimate again
+        told = replace(newest, position_m=desk.mean_report_m())
+        desk.watch.restart(baseline.corrected(told))
     desk.doubt = None
     desk.alarmed.clear()
     if mission.must_be_left(doubt.estimated(index), desk.view):

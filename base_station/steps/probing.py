@@ -1,8 +1,6 @@
 """[0a]: is everybody there, and does everybody answer as its twin does?"""
 
 from base_station import execution, twin
-from base_station.autopilots import adapter
-from base_station.belief.fixes import BOUNCE_SIGMA_M
 from base_station.belief.watch import Baseline, Watch
 from base_station.commander import Commander
 from base_station.commands import Command
@@ -12,7 +10,6 @@ from base_station.fitted import fleet_model
 from base_station.phases import Arming, Connecting, Probing
 from base_station.receiving.telemetry import Frame
 from base_station.steps.travelling import request_beta
-from hil.scenario import StationView
 
 LINK_PATIENCE_S = 10.0
 
@@ -59,17 +56,7 @@ def fresh_watch(desk: Desk) -> Watch:
     state = twin.initial_state(
         [s.position_m for s in newest], [t.status.yaw_rad for t in desk.fleet.tracks]
     )
-    baseline = Baseline(fleet_model(desk.view), bounce_m=bouncing(desk.view))
-    return Watch(desk.view, baseline, state, desk.time_s)
-
-
-def bouncing(view: StationView) -> dict[int, float]:
-    """Vehicles whose estimator goes with its accelerometer when its fix is stuck, where their fixes
-    count."""
-    if view.diagnosis.evidence == "position":
-        return {}
-    kinds = [(m.sysid, adapter(m.autopilot, m.frame)) for m in view.fleet]
-    return {sysid: BOUNCE_SIGMA_M for sysid, kind in kinds if not kind.estimate_lags}
+    return Watch(desk.view, Baseline(fleet_model(desk.view)), state, desk.time_s)
 
 
 def probe(desk: Desk, phase: Probing, frame: Frame) -> Orders:

@@ -175,10 +175,14 @@ def heading_first_commands(vehicles: Any, tile: Any, v: int) -> Any:
     asked = where(magnitude(ahead) > 0.0, 1.0, 0.0)
     rolls = where(magnitude(seen) >= helm[STOP], 1.0, 0.0)
     moving = on * most(asked, rolls)
-    i_x = moving * clipped(take(tile, v, I_X) + helm[SPEED_I] * dt * (ahead - seen), 1.0)
+    throttle, i_x, error = take(tile, v, THROTTLE), take(tile, v, I_X), ahead - seen
+    wanted = helm[SPEED_FF] * ahead + helm[SPEED_P] * error
+    grown = helm[SPEED_I] * dt * error
+    slews = magnitude(clipped(wanted + i_x, 1.0) - throttle) > helm[SLEW] * dt
+    held = where(slews, 0.0 * on, grown)  # while the throttle can't follow, it may only shrink
+    i_x = moving * clipped(i_x + where(error * i_x < 0.0, grown, held), 1.0)
     put(tile, v, I_X, i_x)
-    wanted = moving * (helm[SPEED_FF] * ahead + helm[SPEED_P] * (ahead - seen) + i_x)
-    throttle = take(tile, v, THROTTLE)
+    wanted = moving * (wanted + i_x)
     throttle = throttle + clipped(clipped(wanted, 1.0) - throttle, helm[SLEW] * dt)
     put(tile, v, THROTTLE, throttle)
     yaw, rate = take(tile, v, YAW), take(tile, v, YAW_RATE)

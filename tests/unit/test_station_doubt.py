@@ -30,7 +30,7 @@ class Plant:
     """
 
     def __init__(self, view: StationView, fault: Hypothesis, seed: int = 0) -> None:
-        self.reports = report_faults([fault], np.full(1, 0.5), {})
+        self.reports = report_faults([fault], np.full(1, 0.5))
         self.size = fault.fault.size if fault.fault else ()
         self.past_m: list[NDArray[np.float64]] = []
         self.model = twin.FleetModel.from_view(view)

@@ -93,3 +93,14 @@ def test_its_throttle_slews(lone):
     begins_s = rolling / stall / helm.slew_per_s
     free = stall * helm.slew_per_s / SKID_STEER.mass_kg * (0.2 - begins_s) ** 2 / 2.0
     assert after[V_NORTH] == pytest.approx(free, rel=0.3)
+
+
+def test_from_rest_it_is_as_fast_as_the_firmware_was(lone):
+    """Measured on ArduPilot's rover in our world, told 1 m/s, from when its throttle moved: the
+    integral waits for a throttle that slews, so it does not overshoot."""
+    at_s, measured = [0.37, 0.57, 0.77, 0.97, 1.17, 1.57, 2.07], [0.16, 0.43, 0.71, 0.85, 0.93]
+    state, reached = at_rest(), []
+    for after_s in np.diff([0.0, *at_s]):
+        state = run(lone, state, [1.0, 0.0, NAN], float(after_s))
+        reached.append(float(state[0, 0, V_NORTH]))
+    assert reached == pytest.approx([*measured, 0.98, 1.0], abs=0.05)
