@@ -38,7 +38,7 @@ _RECORD = struct.Struct("<IIB")
 _STEP = struct.Struct("<dQHH")
 _DATAGRAM = struct.Struct("<HI")
 _ANSWER = struct.Struct("<I")
-_HEAD, _STEPPED, _SENT, _SAID = 1, 2, 3, 4
+_HEAD, _STEPPED, _SENT, _SAID, _GIVEN_BACK = 1, 2, 3, 4, 5
 
 Datagrams = tuple[tuple[int, bytes], ...]
 
@@ -48,13 +48,15 @@ class Inputs:
     """All that one step of the station depends on.
 
     `wall_s` and `epoch_us` are its clocks, `datagrams` (fleet index, bytes) those that said
-    something, `answers` those of the planner.
+    something, `answers` those of the planner; `given_back` whether a person has given back, before
+    it, the vehicles that had been taken over.
     """
 
     wall_s: float
     epoch_us: int
     datagrams: Datagrams = ()
     answers: tuple[PlanReady, ...] = ()
+    given_back: bool = False
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,8 @@ def encoded(record: Record) -> bytes:
                 _packed(record.datagrams),
                 *(_ANSWER.pack(len(a)) + a for a in answers),
             ]
-            kind, payload = _STEPPED, b"".join(parts)
+            kind = _GIVEN_BACK if record.given_back else _STEPPED
+            payload = b"".join(parts)
         case Sent():
             kind, payload = _SENT, _packed(record.datagrams)
         case Said():
@@ -231,7 +234,7 @@ def _record(kind: int, payload: bytes) -> Record:
         return Said(json.loads(payload))
     if kind == _SENT:
         return Sent(tuple(_datagrams(payload, 0, None)[0]))
-    if kind != _STEPPED:
+    if kind not in (_STEPPED, _GIVEN_BACK):
         raise ValueError(f"record of kind {kind}")
     wall_s, epoch_us, count, answers = _STEP.unpack_from(payload)
     datagrams, at = _datagrams(payload, _STEP.size, count)
@@ -244,7 +247,7 @@ def _record(kind: int, payload: bytes) -> Record:
             raise ValueError("an answer that is no plan")
         ready.append(answer)
         at += length
-    return Inputs(wall_s, epoch_us, tuple(datagrams), tuple(ready))
+    return Inputs(wall_s, epoch_us, tuple(datagrams), tuple(ready), kind == _GIVEN_BACK)
 
 
 def _datagrams(data: bytes, at: int, count: int | None) -> tuple[list[tuple[int, bytes]], int]:

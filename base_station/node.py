@@ -88,13 +88,15 @@ class StationNode:
         self._trainings: list[dict[str, Any]] = []
         self._waiting: PlanRequest | None = None
         self._ended_s: float | None = None
+        self._given_back = False
         self.finished = False
 
     def step(self, wall_s: float, epoch_us: int) -> None:
         """Receive, decide, send. `epoch_us` stamps logs and signatures."""
         self._epoch_us = epoch_us
         datagrams, heard = self._receive()
-        inputs = Inputs(wall_s, epoch_us, datagrams, self._answers())
+        inputs = Inputs(wall_s, epoch_us, datagrams, self._answers(), self._given_back)
+        self._given_back = False
         self._keep(self._forget_the_wait)
         self._keep(lambda journal: journal.inputs(inputs))
         out = self._advance(inputs, heard)
@@ -136,7 +138,7 @@ class StationNode:
 
     def give_back(self) -> None:
         """Vehicles that were taken over are the station's again, from the next step on."""
-        self.station.give_back()
+        self._given_back = True
 
     def emergency_stop(self) -> None:
         """Motors off."""
@@ -184,6 +186,8 @@ class StationNode:
         return tuple(kept), heard
 
     def _advance(self, inputs: Inputs, heard: Heard) -> Outputs:
+        if inputs.given_back:
+            self.station.give_back()
         out = self.station.step(inputs.wall_s, heard, inputs.answers)
         if out.request is not None:
             self._waiting = out.request

@@ -13,8 +13,8 @@ from base_station.resuming import resume
 from hil.bench.folders import blind_view
 from hil.bench.rig import Rig
 from hil.errors import InputError
-from hil.mavlink import Decoder, LocalSetpoint, key_of
-from hil.scenario import Scenario, load_scenario
+from hil.mavlink import Decoder, Encoder, LocalSetpoint, RoverMode, key_of
+from hil.scenario import Safety, Scenario, StationView, load_scenario
 from tests.conftest import SCENARIOS
 from tests.scenarios.bench import Heard, run_until_ended, scripted, start
 
@@ -45,15 +45,21 @@ class Bench:
     scenario: Scenario
     folder: Path
     key: bytes | None = None
+    safety: Safety | None = None
     heard: Heard = field(init=False)
 
     def __post_init__(self) -> None:
         self.rig, self.heard, self.times = start(
             self.scenario, scripted(0.8), self._journal(resumed=False), self.key
         )
+        if self.safety is not None:
+            self.rig.node.station.desk.view = self._view()
+
+    def _view(self) -> StationView:
+        return blind_view(self.scenario).model_copy(update={"safety": self.safety})
 
     def _journal(self, resumed: bool) -> Keeper:
-        view = blind_view(self.scenario).model_dump(mode="json")
+        view = self._view().model_dump(mode="json")
         return Journal(self.folder, Head(view, resumed, self.key is not None))
 
     def kill(self) -> None:
@@ -103,6 +109,23 @@ def test_killed_and_resumed_it_believes_the_same_and_finds_the_fault(
     assert verdict is not None
     assert (verdict.sysid, verdict.hypothesis, verdict.decided) == (2, RIGHT[name], True)
     assert any("in touch again" in text for text in bench.heard.texts("link"))
+
+
+def test_what_was_given_back_before_it_died_is_the_station_s_again(tmp_path: Path) -> None:
+    safety = Safety(allow_contact=True, fence_margin_m=0.0)
+    bench = Bench(scenario_of("healthy"), tmp_path, safety=safety)
+    until(bench.times, 6.0)
+    bench.rig.vehicle(3).receive("gcs", Encoder(255, 190).set_mode(3, RoverMode.MANUAL))
+    until(bench.times, 12.0)
+    assert any("was taken over" in text for text in bench.heard.texts("takeover"))
+    bench.rig.node.give_back()
+    until(bench.times, 16.0)
+    bench.kill()
+    until(bench.times, 16.0 + DEAD_S)
+    bench.revive()
+    run_until_ended(bench.rig, bench.times)
+    assert bench.heard.texts("end") == ["holding: no mission plan found"]  # scripted() has none
+    assert len([text for text in bench.heard.texts("takeover") if "was taken" in text]) == 1
 
 
 def test_killed_twice_with_signed_links(tmp_path: Path) -> None:

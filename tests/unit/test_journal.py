@@ -33,7 +33,7 @@ ANSWER = PlanReady(
 )
 DATAGRAMS = st.lists(st.tuples(st.integers(0, 99), st.binary(max_size=300)), max_size=5).map(tuple)
 STEPS = st.builds(
-    Inputs, st.floats(0, 1e9), st.integers(0, 2**63), DATAGRAMS, st.just(())
+    Inputs, st.floats(0, 1e9), st.integers(0, 2**63), DATAGRAMS, st.just(()), st.booleans()
 ) | st.builds(Sent, DATAGRAMS)
 
 
