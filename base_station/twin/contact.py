@@ -1,7 +1,7 @@
-"""Contacts of discs with each other, with walls and with obstacles: found and measured.
+"""Contacts of discs with each other and with obstacles: found and measured.
 
 A contact is a row of `contacts` [C, CONTACT_COLUMNS, lanes] for one pair of blocks of the tile,
-`bodies` [C, 2] (the second is the ground for walls and obstacles, which come last). In lanes where
+`bodies` [C, 2] (the second is the ground for obstacles, which come last). In lanes where
 the two are out of reach it is FAR, and does nothing. Indices of blocks are unsigned: as such they
 can't count from the end.
 """
@@ -13,7 +13,7 @@ import numpy as np
 from base_station.twin.compiled import inlined
 from base_station.twin.lanes import anywhere, least, most, put, root, shortened, take, where
 from base_station.twin.state import EAST, NORTH
-from base_station.twin.tile import BUSY, INVERSE_INERTIA, INVERSE_MASS, shift
+from base_station.twin.tile import BUSY, CORRECTION, INVERSE_INERTIA, INVERSE_MASS, shift
 
 NORMAL_N = 0  # unit vector from the first to the second
 NORMAL_E = 1
@@ -25,7 +25,6 @@ RUB = 6  # N s, across it
 CONTACT_COLUMNS = 8  # one to spare
 
 FAR_MPS = 1e9
-CORRECTION = 0.5  # share of a penetration removed per step
 CENTRED_M = 1e-9  # nearer than this no direction is right: any one separates the two
 NO_MASS = 1e-30
 
@@ -60,26 +59,13 @@ def find_pairs(
 
 
 @inlined
-def find_walls(vehicles: Any, tile: Any, places: Any, n: int, contacts: Any, bodies: Any) -> int:
-    """Add what meets walls and obstacles to the first `n` contacts; returns how many it is then."""
-    radius, reach, walls = vehicles.radius_m, vehicles.reach_m, vehicles.bounds_m
+def find_obstacles(
+    vehicles: Any, tile: Any, places: Any, n: int, contacts: Any, bodies: Any
+) -> int:
+    """Add what meets obstacles to the first `n` contacts; returns how many it is then."""
+    radius, reach = vehicles.radius_m, vehicles.reach_m
     ground: Any = np.uintp(tile.shape[0] - 1)
     i: Any
-    for side in range(2):  # neighbours in this order don't wait for each other's velocities
-        axis: Any = np.uintp(side)  # 0 north, 1 east
-        is_east = 1.0 if side > 0 else 0.0
-        for v in range(tile.shape[0] - 1):
-            i = np.uintp(v)
-            at = take(places, i, axis)
-            to_low = shortened(at - walls[2 * side])
-            to_high = shortened(walls[2 * side + 1] - at)
-            gap = least(to_low, to_high) - radius[i]
-            if anywhere(gap < reach):
-                towards = where(to_low < to_high, -1.0, 1.0)
-                nn, ne = towards * (1.0 - is_east), towards * is_east
-                bodies[n, 0], bodies[n, 1] = i, ground
-                enter(vehicles, tile, places, i, ground, 0.0, nn, ne, gap, contacts, n)
-                n += 1
     for k in range(vehicles.obstacles_m.shape[0]):
         stroke = vehicles.obstacles_m[k]
         along_n, along_e = stroke[2] - stroke[0], stroke[3] - stroke[1]

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from base_station.twin.compiled import cached, compiled, inlined, sources
-from base_station.twin.contact import CONTACT_COLUMNS, IMPULSE, find_pairs, find_walls
+from base_station.twin.contact import CONTACT_COLUMNS, IMPULSE, find_obstacles, find_pairs
 from base_station.twin.drive import drive, take_commands, wrapped
-from base_station.twin.lanes import LANES, put, take
+from base_station.twin.lanes import LANES, put, take, where
 from base_station.twin.search import CELLS_ABOVE, all_pairs, near_pairs, pair_capacity
 from base_station.twin.solve import solve_contacts
 from base_station.twin.state import (
@@ -27,7 +27,8 @@ from base_station.twin.state import (
     YAW,
     YAW_RATE,
 )
-from base_station.twin.tile import COLUMNS, FRICTION, aligned, face, gather, shift
+from base_station.twin.tile import COLUMNS, FRICTION, TOUCHED, aligned, face, gather, shift
+from base_station.twin.walls import find_walls, note_walls
 
 
 @inlined
@@ -61,6 +62,7 @@ def advance_all(
     pairs = np.empty((pair_capacity(count), 2), np.uintp)
     found = all_pairs(count, pairs) if count <= CELLS_ABOVE else 0
     bodies = np.empty((contacts.shape[0], 2), np.uintp)
+    walled = np.empty(count, np.bool_)
     same = draws == 1 and lanes % hypotheses == 0  # every tile has the same constants
     for first in range(0, batch, lanes):
         load(states, first, tile, places)
@@ -84,14 +86,17 @@ def advance_all(
             if count > CELLS_ABOVE:
                 found = near_pairs(places, vehicles.radius_m, vehicles.reach_m, pairs)
             between = find_pairs(vehicles, columns, spots, pairs, found, rows, bodies)
-            n = find_walls(vehicles, columns, spots, between, rows, bodies)
-            if n > 0:
-                solve_contacts(vehicles, columns, rows, bodies, between, n, locked)
-                note_contacts(contacts, bodies, n, first, impulses, walls)
+            n = find_obstacles(vehicles, columns, spots, between, rows, bodies)
+            if find_walls(vehicles, columns, spots, walled) or n > 0:
+                solve_contacts(vehicles, columns, rows, bodies, between, n, walled, locked)
+                note_walls(columns, walled)
+                note_obstacles(columns, rows, bodies, between, n)
+                if impulses.shape[1] > 0:
+                    note_pairs(contacts, bodies, between, first, impulses)
             move(columns, spots, vehicles.dt_s, locked)
             if not locked:
                 face(columns)
-        store(tile, places, states, first, locked)
+        store(tile, places, states, walls, first, locked)
 
 
 @compiled
@@ -106,15 +111,17 @@ def load(states: Any, first: int, tile: Any, places: Any) -> None:
             yaw = states[b, v, YAW]
             if not -math.pi <= yaw < math.pi:
                 yaw = (yaw + math.pi) % (2.0 * math.pi) - math.pi
-            tile[v, YAW, lane] = yaw
+            tile[v, YAW, lane], tile[v, TOUCHED, lane] = yaw, 0.0
 
 
 @compiled
-def store(tile: Any, places: Any, states: Any, first: int, locked: bool) -> None:
-    """What nobody has changed stays as it was, to the last digit: yaw when locked, held reports."""
+def store(tile: Any, places: Any, states: Any, walls: Any, first: int, locked: bool) -> None:
+    """What nothing has changed stays as it was, to the bit: held reports, a locked yaw."""
     for lane in range(min(tile.shape[2], states.shape[0] - first)):
         b = first + lane
         for v in range(states.shape[1]):
+            if tile[v, TOUCHED, lane] > 0.0:
+                walls[b, v] = True
             states[b, v, NORTH], states[b, v, EAST] = places[v, NORTH, lane], places[v, EAST, lane]
             if not locked:
                 states[b, v, YAW] = tile[v, YAW, lane]
@@ -133,29 +140,31 @@ def move(tile: Any, places: Any, dt: float, locked: bool) -> None:
             put(tile, v, YAW, wrapped(take(tile, v, YAW) + take(tile, v, YAW_RATE) * dt))
 
 
+@inlined
+def note_obstacles(tile: Any, rows: Any, bodies: Any, between: int, n: int) -> None:
+    for row in range(between, n):
+        i: Any = bodies[row, 0]
+        met = take(rows, row, IMPULSE) > 0.0
+        put(tile, i, TOUCHED, where(met, 1.0, take(tile, i, TOUCHED)))
+
+
 @compiled
-def note_contacts(
-    contacts: Any, bodies: Any, n: int, first: int, impulses: Any, walls: Any
-) -> None:
-    """Add normal impulses (N s) to [B, V, V] if it is wanted (not empty), and mark walls [B, V]."""
-    rows, count = walls.shape
-    for k in range(n):
+def note_pairs(contacts: Any, bodies: Any, between: int, first: int, impulses: Any) -> None:
+    """Add normal impulses (N s) to [B, V, V]."""
+    for k in range(between):
         i, j = bodies[k, 0], bodies[k, 1]
-        for lane in range(min(contacts.shape[2], rows - first)):
+        for lane in range(min(contacts.shape[2], impulses.shape[0] - first)):
             impulse = contacts[k, IMPULSE, lane]
             if impulse > 0.0:
-                if j == count:
-                    walls[first + lane, i] = True
-                elif impulses.shape[1] > 0:
-                    impulses[first + lane, i, j] += impulse
-                    impulses[first + lane, j, i] += impulse
+                impulses[first + lane, i, j] += impulse
+                impulses[first + lane, j, i] += impulse
 
 
 @compiled
 def room(vehicles: Any) -> int:
     """How many contacts there may be."""
     count = vehicles.radius_m.shape[0]
-    result: int = pair_capacity(count) + (2 + vehicles.obstacles_m.shape[0]) * count
+    result: int = pair_capacity(count) + vehicles.obstacles_m.shape[0] * count
     return result
 
 

@@ -34,6 +34,7 @@ from base_station.twin.tile import (
     SIN,
     YAW_LOSS,
 )
+from base_station.twin.walls import stop
 
 ITERATIONS = 8
 EAGER = 1.3  # over-relaxation: as exact in 8 rounds as plain ones in 12
@@ -42,7 +43,14 @@ SETTLED_NS = 1e-4  # no impulse changes by more: 0.01 mm/s of a rover
 
 @inlined
 def solve_contacts(
-    vehicles: Any, tile: Any, contacts: Any, bodies: Any, between: int, n: int, locked: bool
+    vehicles: Any,
+    tile: Any,
+    contacts: Any,
+    bodies: Any,
+    between: int,
+    n: int,
+    walled: Any,
+    locked: bool,
 ) -> None:
     """Change velocities so that no gap closes further than to touch. The first `between` of `n`
     contacts are those of two vehicles. A lane that has settled (BUSY 0) stays as it is, so that it
@@ -64,6 +72,8 @@ def solve_contacts(
             given = push_off(vehicles, tile, i, contacts, row, friction, busy, eager, locked)
             change = most(change, given)
         for v in range(ground):
+            if walled[v]:
+                change = most(change, stop(vehicles, tile, v, friction, busy, eager, locked))
             hold(vehicles, tile, v, busy, locked)
         going = change > SETTLED_NS
         if not anywhere(going):

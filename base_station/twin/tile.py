@@ -35,7 +35,14 @@ YAW_LOSS = COS + 10  # and scrub, rad/s
 STUCK = COS + 11  # 2 columns: the GPS axis (north, east) is frozen
 PULL = COS + 13  # of one motor while they are gathered: stall force, weak or reversed, and ...
 SLOWING = COS + 14  # ... stall force over free speed
-GIVE = COS + 15  # 9 columns
+MASS = COS + 15
+RIM_SHARE = COS + 16  # of a rim's slip along a wall that goes into the velocity, not the turn rate
+TOUCHED = COS + 17  # 1: a wall or an obstacle, in this call
+LOWEST = COS + 18  # per axis (north, east): speeds between which it gets no further than ...
+HIGHEST = COS + 20  # ... to a wall, m/s
+STOPPED = COS + 22  # what walls have taken off the speed in this step, m/s ...
+RUBBED = COS + 24  # ... and, by friction, off that along the other axis
+GIVE = COS + 26  # 9 columns
 DAMP = GIVE + 9  # 9 columns
 COLUMNS = DAMP + 9
 
@@ -43,6 +50,7 @@ COLUMNS = DAMP + 9
 FRICTION = PULL  # of this world's contacts
 BUSY = SLOWING  # 1: contacts are still to be settled
 
+CORRECTION = 0.5  # share of a penetration removed per step
 ALIGNED_BYTES = 64  # a vector register, and a line of the processor's cache
 
 S_3, S_5, S_7, S_9, S_11, S_13 = (1.0 / math.factorial(n) for n in (3, 5, 7, 9, 11, 13))
@@ -70,8 +78,10 @@ def gather(
             p, h = draw[lane], hypothesis[lane]
             per_mass = 1.0 / parameters.mass_kg[p, v]
             per_inertia = 1.0 / parameters.inertia_kgm2[p, v]
-            tile[v, INVERSE_MASS, lane] = per_mass
+            tile[v, INVERSE_MASS, lane], tile[v, MASS, lane] = per_mass, parameters.mass_kg[p, v]
             tile[v, INVERSE_INERTIA, lane] = 0.0 if vehicles.yaw_locked else per_inertia
+            spin = vehicles.radius_m[v] ** 2 * tile[v, INVERSE_INERTIA, lane]
+            tile[v, RIM_SHARE, lane] = per_mass / (per_mass + spin)
             tile[v, LOSS, lane] = parameters.rolling_force_n[p, v] * per_mass * dt
             tile[v, SIDE_LOSS, lane] = parameters.side_force_n[p, v] * per_mass * dt
             tile[v, YAW_LOSS, lane] = parameters.yaw_resistance_nm[p, v] * per_inertia * dt
