@@ -44,8 +44,11 @@ def fleet_model(view: StationView) -> FleetModel:
 
 
 def latency_s(member: FleetMember) -> float:
-    """From the arrival of a set-point to its effect: as found, or as the adapter has it."""
-    found = [fit.latency_s for fit in member.identified.values()]
+    """From the arrival of a set-point to its effect: as found, or as the adapter has it.
+
+    What the link took then is not the vehicle's: what it takes now is measured all the time.
+    """
+    found = [max(0.0, fit.latency_s - fit.link_s) for fit in member.identified.values()]
     return max(found) if found else adapter(member.autopilot, member.frame).latency_s
 
 

@@ -13,6 +13,7 @@ from base_station import execution
 from base_station.autopilots import adapter
 from base_station.desk import Desk
 from base_station.execution import Orders
+from base_station.fitted import latency_s
 from base_station.phases import Finished
 from base_station.receiving.telemetry import Frame
 from hil.frames import body_to_ned, ned_to_body
@@ -31,7 +32,8 @@ STANDING_S = 30.0  # everybody, at first: the noise of the receivers
 class Tried:
     """One axis of one vehicle as it went: what was sent [N], and what was seen of it [M].
 
-    Speeds and positions are along that body axis; a set-point of NaN is HOLD.
+    Speeds and positions are along that body axis; a set-point of NaN is HOLD. `link_s`: how long
+    the link took, from a report until what answers it was there.
     """
 
     index: int
@@ -42,6 +44,7 @@ class Tried:
     seen_s: Array
     position_m: Array
     velocity_mps: Array
+    link_s: float = 0.0
 
     def seen_as(self, rows: Array) -> "Tried":
         """With other observations [M, 5]: time, north, east, north and east velocity."""
@@ -60,7 +63,7 @@ class Tried:
 @dataclass
 class _Rows:
     yaw_rad: float
-    rows: list[tuple[float, float, float, float]] = field(default_factory=list)
+    rows: list[tuple[float, ...]] = field(default_factory=list)
 
 
 def schedule(speed_mps: float) -> list[tuple[float, float]]:
@@ -103,7 +106,8 @@ class Excitation:
         along = ned_to_body(*_pair(frame.position_m[index]), rows.yaw_rad)[axis]
         speed = ned_to_body(*_pair(frame.velocity_mps[index]), rows.yaw_rad)[axis]
         if frame.fresh[index]:
-            rows.rows.append((frame.time_s, setpoint_mps, along, speed))
+            link_s = float(frame.delay_s[index]) - latency_s(self._view.fleet[index])
+            rows.rows.append((frame.time_s, setpoint_mps, along, speed, link_s))
         orders = execution.hold(len(self._view.fleet))
         if setpoint_mps == setpoint_mps:
             body = (setpoint_mps, 0.0) if axis == 0 else (0.0, setpoint_mps)
@@ -151,8 +155,9 @@ def _axes(member: FleetMember) -> tuple[int, ...]:
 
 
 def _tried(index: int, axis: int, yaw_rad: float, rows: Array) -> Tried:
-    time_s, setpoint, position, velocity = rows.T
-    return Tried(index, axis, yaw_rad, time_s, setpoint, time_s, position, velocity)
+    time_s, setpoint, position, velocity, link_s = rows.T
+    usual_s = float(np.nanmedian(link_s))
+    return Tried(index, axis, yaw_rad, time_s, setpoint, time_s, position, velocity, usual_s)
 
 
 def _pair(row: Array) -> tuple[float, float]:

@@ -27,6 +27,7 @@ class AxisFit:
     residual_mps: float
     residual_m: float
     nominal_residual_m: float  # of the data sheet's parameters, latency 0
+    link_s: float  # of the latency, what was the link's
 
 
 def fit_axis(tried: Tried, response: Response) -> AxisFit:
@@ -71,6 +72,7 @@ def fit_axis(tried: Tried, response: Response) -> AxisFit:
         _rms(velocity),
         _rms(position),
         _rms(errors(nominal)[1]),
+        tried.link_s,
     )
 
 

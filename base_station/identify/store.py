@@ -36,6 +36,7 @@ def _vehicle(fit: VehicleFit) -> dict[str, Any]:
             "time_constant_s": round(axis.derived.time_constant_s, DIGITS),
             "speed_gain": round(axis.derived.speed_gain, DIGITS),
             "latency_s": round(axis.derived.latency_s, DIGITS),
+            "link_s": round(max(0.0, axis.link_s), DIGITS),
             "parameters": [round(x, DIGITS) for x in axis.parameters],
             "residual_mps": round(axis.residual_mps, DIGITS),
             "residual_m": round(axis.residual_m, DIGITS),

@@ -1,5 +1,7 @@
 """Fleet files: real vehicles, or simulators started by hand, for `base-station FLEET`."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -16,8 +18,8 @@ from hil.scenario.fields import (
 )
 from hil.scenario.mission import Diagnosis, Limits, Planning
 from hil.scenario.places import Arena, Clock, OriginModel, Point
-from hil.scenario.station import FleetMember, Identified, Safety, StationView
-from hil.scenario.vehicles import Sensors, Uncertainty
+from hil.scenario.station import FleetMember, Safety, StationView
+from hil.scenario.vehicles import Identified, Sensors, Uncertainty
 
 
 class FleetVehicle(Model):
@@ -67,15 +69,14 @@ class FleetFile(Model):
         self.view()
         return self
 
-    def view(self, found: "Found | None" = None) -> StationView:
-        """The same, as the station knows it, with what was found of the vehicles."""
+    def view(self, found: Mapping[str, FoundVehicle] = MappingProxyType({})) -> StationView:
+        """The same, as the station knows it, with what was found of the vehicles, by name."""
         tree: dict[str, Any] = self.model_dump(exclude={"fleet"})
-        of = {} if found is None else found.identified
         members = tuple(
             FleetMember(
                 **v.model_dump(),
                 start_yaw_deg=0.0,
-                identified=of[v.name].axes if v.name in of else {},
+                identified=found[v.name].axes if v.name in found else {},
             )
             for v in self.fleet
         )

@@ -1,6 +1,6 @@
 """Scenario files: safe YAML, overrides, and messages for people."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from hil.errors import InputError
 from hil.scenario.fields import Model
-from hil.scenario.fleetfile import FleetFile, Found, is_fleet_file
+from hil.scenario.fleetfile import FleetFile, Found, FoundVehicle, is_fleet_file
 from hil.scenario.schema import Scenario
 from hil.scenario.station import StationView
 
@@ -21,11 +21,20 @@ M = TypeVar("M", bound=Model)
 
 
 def load_scenario(path: Path, overrides: Sequence[str] = ()) -> Scenario:
-    """Read a scenario; `overrides` are `key.path=value` as given to `--set`. Raises InputError."""
+    """Read a scenario, with what `hil identify` wrote of its vehicles where that lies beside it.
+
+    `overrides` are `key.path=value` as given to `--set`. Raises InputError.
+    """
     tree = read_map(path)
     for override in overrides:
         apply_override(tree, override)
-    return validated(Scenario, path, tree)
+    scenario = validated(Scenario, path, tree)
+    found = _found_beside(path, {v.name: v.sysid for v in scenario.fleet})
+    fleet = [
+        v.model_copy(update={"identified": found[v.name].axes}) if v.name in found else v
+        for v in scenario.fleet
+    ]
+    return scenario.model_copy(update={"fleet": tuple(fleet)}) if found else scenario
 
 
 def load_station_view(path: Path) -> StationView:
@@ -35,22 +44,24 @@ def load_station_view(path: Path) -> StationView:
     """
     tree = read_map(path)
     if is_fleet_file(tree):
-        beside = path.with_suffix(".identified.yaml")
-        found = validated(Found, beside, read_map(beside)) if beside.exists() else None
-        return _fitting(validated(FleetFile, path, tree), found, beside).view(found)
+        fleet = validated(FleetFile, path, tree)
+        return fleet.view(_found_beside(path, {v.name: v.sysid for v in fleet.fleet}))
     return validated(StationView, path, tree)
 
 
-def _fitting(fleet: FleetFile, found: Found | None, path: Path) -> FleetFile:
-    """The fleet, if what was found is of it. Raises InputError."""
-    sysids = {v.name: v.sysid for v in fleet.fleet}
-    for name, vehicle in ({} if found is None else found.identified).items():
+def _found_beside(path: Path, sysids: Mapping[str, int]) -> dict[str, FoundVehicle]:
+    """What `hil identify` wrote beside a file, by the vehicles' names. Raises InputError."""
+    beside = path.with_suffix(".identified.yaml")
+    if not beside.exists():
+        return {}
+    found = validated(Found, beside, read_map(beside)).identified
+    for name, vehicle in found.items():
         if sysids.get(name) != vehicle.sysid:
             raise InputError(
-                f"{path}: identified.{name}.sysid = {vehicle.sysid}: no such vehicle here; "
+                f"{beside}: identified.{name}.sysid = {vehicle.sysid}: no such vehicle here; "
                 "run hil identify again, or remove the file"
             )
-    return fleet
+    return found
 
 
 def validated(model: type[M], path: Path, tree: dict[str, Any]) -> M:

@@ -26,7 +26,7 @@ from hil.scenario.fields import (
 from hil.scenario.mission import Diagnosis, Limits, Planning
 from hil.scenario.places import Arena, Clock, Geofence, Obstacles, OriginModel, Point
 from hil.scenario.schema import Scenario
-from hil.scenario.vehicles import Sensors, Uncertainty
+from hil.scenario.vehicles import Identified, Sensors, Uncertainty
 
 STATION_AIRFRAMES = ("omni_plus", "skid_steer")  # those that the station's twin can be
 
@@ -36,19 +36,6 @@ def _twinned_airframe(name: str) -> str:
         known = ", ".join(STATION_AIRFRAMES)
         raise ValueError(f"the base station has no twin of that; it knows {known}")
     return name
-
-
-class Identified(Model):
-    """What `hil identify` found of one body axis, as it writes it."""
-
-    model: str
-    time_constant_s: Positive
-    speed_gain: Positive
-    latency_s: NonNegative
-    parameters: tuple[Finite, ...]
-    residual_mps: NonNegative
-    residual_m: NonNegative
-    nominal_residual_m: NonNegative
 
 
 class FleetMember(Model):
@@ -153,6 +140,7 @@ def station_view(scenario: Scenario, mavlink_port_base: int, station_seed: int) 
             autopilot=v.autopilot,
             start_yaw_deg=v.start_yaw_deg,
             goal=v.goal,
+            identified=v.identified,
             mavlink_port=mavlink_port_base + PORTS_PER_VEHICLE * i,
         )
         for i, v in enumerate(scenario.fleet)

@@ -46,6 +46,23 @@ Radios = Annotated[
 ]
 
 
+class Identified(Model):
+    """What `hil identify` found of one body axis, as it writes it.
+
+    `latency_s` is from a report to the effect of what answers it; `link_s` of that is the link's.
+    """
+
+    model: str
+    time_constant_s: Positive
+    speed_gain: Positive
+    latency_s: NonNegative
+    link_s: NonNegative = 0.0
+    parameters: tuple[Finite, ...]
+    residual_mps: NonNegative
+    residual_m: NonNegative
+    nominal_residual_m: NonNegative
+
+
 class Vehicle(Model):
     name: VehicleName
     sysid: SysId
@@ -56,6 +73,7 @@ class Vehicle(Model):
     start_yaw_deg: Finite = 0.0
     goal: Point
     radio: Annotated[Radios, Field(max_length=100)] | None = None  # None: the scenario's
+    identified: dict[Literal["x", "y"], Identified] = Field(default={})  # the station's twin of it
 
     @property
     def frame(self) -> Airframe:

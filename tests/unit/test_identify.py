@@ -73,6 +73,8 @@ def test_latency_within_ten_milliseconds(
         assert quick.axes[axis].derived.latency_s == pytest.approx(0.05, abs=0.01)
         more_s = slow.axes[axis].derived.latency_s - quick.axes[axis].derived.latency_s
         assert more_s == pytest.approx(2.0 * DELAY_S, abs=0.01)
+        of_link_s = slow.axes[axis].link_s - quick.axes[axis].link_s
+        assert of_link_s == pytest.approx(2.0 * DELAY_S, abs=0.01)
 
 
 def test_noise_within_fifteen_percent(
