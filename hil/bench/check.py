@@ -5,7 +5,7 @@ from pathlib import Path
 from base_station.autopilots import adapter
 from base_station.belief.hypotheses import candidates
 from hil.airframe import push_margin
-from hil.bench.firmware import is_foreign, start_of
+from hil.bench.firmware import can_break, is_foreign, start_of
 from hil.bench.onsets import Onsets
 from hil.bench.record import describe_fault
 from hil.errors import InputError
@@ -56,7 +56,8 @@ def _refuse_unknown_autopilot(path: Path, scenario: Scenario) -> None:
 
 
 def _refuse_unbreakable(path: Path, scenario: Scenario) -> None:
-    """A foreign firmware knows nothing of our injector: the world has to break it."""
+    """A foreign firmware knows nothing of our injector: what it has no parameter for, the world
+    has to do."""
     for i, v in enumerate(scenario.fleet):
         if is_foreign(v) and start_of(v.autopilot) is None:
             raise InputError(
@@ -64,10 +65,18 @@ def _refuse_unbreakable(path: Path, scenario: Scenario) -> None:
                 "use testbed, or start it by hand with `hil world`"
             )
     for i, fault in enumerate(scenario.faults):
-        if is_foreign(scenario.vehicle(fault.vehicle)) and not fault.by_world:
+        vehicle = scenario.vehicle(fault.vehicle)
+        if not is_foreign(vehicle) or fault.by_world:
+            continue
+        if not can_break(scenario, fault):
             raise InputError(
-                f"{path}: faults.{i}: {scenario.vehicle(fault.vehicle).name} is not ours to break "
-                "from inside; add applied_by: world"
+                f"{path}: faults.{i}: {vehicle.name} is not ours to break from inside, and its "
+                "firmware has no parameter for that; add applied_by: world"
+            )
+        if fault.onset.at_s == 0.0:
+            raise InputError(
+                f"{path}: faults.{i}.onset.at_s = 0: the firmware of {vehicle.name} takes a fault "
+                "only while it runs; give a later time"
             )
 
 

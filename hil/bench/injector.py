@@ -10,8 +10,9 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from hil.bench.firmware import breaking, mending
 from hil.errors import InputError, ProcessDiedError
-from hil.faults import Injection, to_clearing, to_injection
+from hil.faults import Injection
 from hil.mavlink import (
     COMPONENT_GCS,
     Command,
@@ -148,6 +149,7 @@ class Breaker:
         to_world: Callable[[Break | Mend], None],
         signing: Callable[[], Signing | None] | None = None,
     ) -> None:
+        self._scenario = scenario
         sysid = scenario.links.injector_sysid
         self._injectors = {
             v.sysid: Injector(v.name, v.sysid, sysid, signing and signing()) for v in scenario.fleet
@@ -165,14 +167,12 @@ class Breaker:
     def strike(self, faults: Iterable[FaultModel]) -> None:
         """Ask for faults, from the next step on."""
         for fault in faults:
-            injection = to_injection(fault.fault(), fault.announced)
-            self._ask(fault, injection, Break(fault), self._struck)
+            self._ask(fault, breaking(self._scenario, fault), Break(fault), self._struck)
 
     def mend(self, faults: Iterable[FaultModel]) -> None:
         """Ask for the end of faults, from the next step on."""
         for fault in faults:
-            clearing = to_clearing(fault.fault().unit, fault.instances)
-            self._ask(fault, clearing, Mend(fault), self._mended)
+            self._ask(fault, mending(self._scenario, fault), Mend(fault), self._mended)
 
     def _ask(
         self, fault: FaultModel, injection: Injection, order: Break | Mend, report: Report

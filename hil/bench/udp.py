@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from hil.bench.firmware import start_of
+from hil.bench.firmware import is_foreign, start_of
 from hil.bench.folders import SCENARIO_FILE, VIEW_FILE, Folders
 from hil.bench.injector import Breaker
 from hil.bench.leash import Leash
@@ -135,7 +135,8 @@ class _Run:
         links = self._scenario.links
         assert links.injector_port_base is not None
         for i, v in enumerate(self._scenario.fleet):
-            link = UdpLink.connect(links.host, links.injector_port_base + PORTS_PER_VEHICLE * i)
+            reach = UdpLink.bind if is_foreign(v) else UdpLink.connect  # a firmware calls us
+            link = reach(links.host, links.injector_port_base + PORTS_PER_VEHICLE * i)
             stack.callback(link.close)
             self._injector_links[v.sysid] = link
 

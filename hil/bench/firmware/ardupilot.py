@@ -6,18 +6,23 @@ airframe (from its motors' torque-speed line, as ArduPilot's tuning guide asks).
 """
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from hil.airframe import Airframe
 from hil.bench.processes import Command
 from hil.errors import InputError
+from hil.faults import Fault, Type, Unit
+from hil.frames import Origin, ned_to_wgs84
 from hil.scenario import PORTS_PER_VEHICLE, Scenario, Vehicle
 
 NAME = "ardupilot"
 BINARY = "ARDUROVER"
 AIRFRAMES = ("skid_steer",)
-OTHER_LINES = (1, 2, 5, 6, 7)  # 3 and 4 are its GPS receivers
+OTHER_LINES = (2, 5, 6, 7)  # 3 and 4 are its GPS receivers
 CRUISE_SHARE = 0.7  # of the speed limit, where throttle is calibrated
+LAG_S = 0.1  # SIM_GPS_LAG_MS as it is
+IMUS = (1, 2)
 
 
 def binary() -> Path | None:
@@ -42,6 +47,7 @@ def start(scenario: Scenario, vehicle: Vehicle, folder: Path) -> Command:
     links, index = scenario.links, scenario.fleet.index(vehicle)
     assert links.physics_port_base is not None
     assert links.mavlink_port_base is not None
+    assert links.injector_port_base is not None
     home = folder / vehicle.name
     home.mkdir()
     (home / "rover.parm").write_text(parameters(scenario, vehicle), encoding="utf-8")
@@ -53,6 +59,7 @@ def start(scenario: Scenario, vehicle: Vehicle, folder: Path) -> Command:
         *("--sim-port-out", str(links.physics_port_base + offset)),
         *("--home", f"{origin.lat_deg:.7f},{origin.lon_deg:.7f},{origin.alt_m:g},0"),
         *("--serial0", f"udpclient:{links.host}:{links.mavlink_port_base + offset}"),
+        *("--serial1", f"udpclient:{links.host}:{links.injector_port_base + offset}"),
         *(word for i in OTHER_LINES for word in (f"--serial{i}", "none:x")),
         *("--sysid", str(vehicle.sysid), "--speedup", "1", "--defaults", "rover.parm", "--wipe"),
     )
@@ -90,6 +97,42 @@ def parameters(scenario: Scenario, vehicle: Vehicle) -> str:
         "ATC_ACCEL_MAX": 2.0,
     }
     return "".join(f"{name} {value:g}\n" for name, value in values.items())
+
+
+def broken(fault: Fault, lat_deg: float) -> tuple[tuple[str, float], ...] | None:
+    """SIM_* parameters that make a fault happen, near a latitude; None where it has none.
+
+    By the names of version 4.5 and 4.6-dev. Of motors it has none that would do: SIM_ENGINE_MUL
+    scales the pulse above 1000 us, which on a motor with its zero at 1500 us is another fault.
+    SIM_GPS_NOISE is noise of the altitude. A receiver that is off moves all that it says.
+    """
+    match fault.unit, fault.type:
+        case Unit.GPS, Type.OFF:
+            return (("SIM_GPS_DISABLE", 1.0),)
+        case Unit.GPS, Type.DELAY:
+            return (("SIM_GPS_LAG_MS", 1000.0 * (LAG_S + fault.size[0])),)
+        case Unit.GPS, Type.OFFSET:
+            north_m, east_m, down_m = fault.size
+            lat, lon = ned_to_wgs84(north_m, east_m, Origin(lat_deg, 0.0, 0.0))
+            return _vector("SIM_GPS_GLITCH", (lat - lat_deg, lon, -down_m))
+        case ((Unit.ACCEL | Unit.GYRO), Type.BIAS):
+            name = "ACC" if fault.unit is Unit.ACCEL else "GYR"
+            return tuple(
+                parameter
+                for imu in fault.instances or IMUS
+                for parameter in _vector(f"SIM_{name}{imu}_BIAS", fault.size)
+            )
+    return None
+
+
+def mended(fault: Fault, lat_deg: float) -> tuple[tuple[str, float], ...] | None:
+    """The same parameters as they were."""
+    names = [name for name, _ in broken(fault, lat_deg) or ()]
+    return tuple((name, 1000.0 * LAG_S if name.endswith("LAG_MS") else 0.0) for name in names)
+
+
+def _vector(prefix: str, values: Sequence[float]) -> tuple[tuple[str, float], ...]:
+    return tuple((f"{prefix}_{axis}", v) for axis, v in zip("XYZ", values, strict=True))
 
 
 def _throttle_for(frame: Airframe, speed_mps: float) -> float:
