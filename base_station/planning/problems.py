@@ -30,7 +30,7 @@ def alpha_problem(view: StationView, request: PlanRequest) -> AlphaProblem:
         suspect=suspect,
         period_s=1.0 / view.clock.control_hz,
         steps=round(view.planning.alpha_horizon_s * view.clock.control_hz),
-        limits=Limits.of_view(view, suspect),
+        limits=Limits.of_view(view, suspect, request.states, model),
         objective=objective_of(view.planning.objective, request.posterior),
         declared=view.uncertainty,
         weights=tuple(p / sum(request.posterior) for p in request.posterior),

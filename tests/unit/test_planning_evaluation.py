@@ -17,7 +17,7 @@ from base_station.planning.tasks.evaluation import (
 from base_station.planning.tasks.limits import Limits
 from base_station.twin import EAST, FleetModel, fault_rows, initial_state
 
-ANYTHING = Limits(np.inf, np.inf, np.ones((3, 3), dtype=np.bool_), 0.0)
+ANYTHING = Limits(np.inf, np.inf, np.ones((3, 3), dtype=np.bool_), 0.0, np.zeros(3, np.bool_))
 
 
 def two_reports(moved_m: float, samples: int) -> np.ndarray:

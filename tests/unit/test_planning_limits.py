@@ -15,7 +15,7 @@ from base_station.planning.tasks.candidates import Candidate, best_of, open_loop
 from base_station.planning.tasks.evaluation import INVALID
 from base_station.planning.tasks.limits import clearance_m, closing_mps
 from base_station.steps.diagnosing import announced
-from base_station.twin import V_EAST, FleetModel, initial_state
+from base_station.twin import NORTH, V_EAST, FleetModel, initial_state
 from hil.scenario import Geofence, StationView
 from hil.scenario.station import Safety
 
@@ -75,6 +75,17 @@ def test_one_within_them_is_as_good_as_before(rescue_view, given, speed):
     assert error_of(limited(rescue_view, **given), rammed(speed)) == pytest.approx(
         error_of(rescue_view, rammed(speed))
     )
+
+
+def test_a_suspect_that_stands_at_a_wall_may_be_pushed_along_it(rescue_view):
+    """Its autopilot drove it there while nobody spoke to it: every plan that moves it brushes."""
+    request = experiment(rescue_view)
+    north_m = rescue_view.arena.north_min_m + rescue_view.fleet[1].frame.radius_m - 0.01
+    request.states[..., :, NORTH] = north_m + 1.0
+    request.states[:, 1, NORTH] = north_m
+    found = plan(rescue_view, request, lambda _: None)
+    assert found.plan is not None
+    assert found.plan.predicted_error < rescue_view.diagnosis.plan_error
 
 
 def test_helpers_must_not_touch_each_other_when_only_the_suspect_may_be_touched(rescue_view):

@@ -79,7 +79,7 @@ class AlphaProblem:
             self.period_s,
             states,
             self.reports(states),
-            walls.reshape(states.shape[:3]),
+            (walls & ~self.limits.may_brush).reshape(states.shape[:3]),
             met.impulses_ns.reshape(*states.shape[:2], pairs, pairs),
         )
         terms = self.objective.terms(moment, memory)

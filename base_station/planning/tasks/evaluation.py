@@ -38,7 +38,7 @@ INVALID = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """`reports` [N, H, K + 1, V, 2] (m) from the start on; `walls` [N]: did any twin touch one?
+    """`reports` [N, H, K + 1, V, 2] (m) from the start on; `walls` [N]: did any twin touch one that it may not?
     `breaches` [N]: was any limit broken? `contacts` of N x H rows, if asked for; `work_j` [N, H]
     against rolling resistance."""
 
@@ -80,7 +80,7 @@ def predict(
     stacked = np.stack(reports, axis=1).reshape(n, hypotheses, len(reports), -1, 2)
     return Prediction(
         stacked,
-        np.asarray(walls.reshape(n, -1).any(axis=1)),
+        np.asarray((walls & ~limits.may_brush).reshape(n, -1).any(axis=1)),
         np.asarray(broken.reshape(n, -1).any(axis=1)),
         whole,
         work_j.reshape(n, hypotheses),

@@ -12,22 +12,26 @@ from hil.scenario import StationView
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+AT_A_WALL_M = 0.05
 PRICE = 1.0  # per pair or vehicle, twin and control period in breach
 
 
 @dataclass(frozen=True, eq=False)
 class Limits:
     """`speed_mps` at which two vehicles may meet, `impulse_ns` between two in a control period,
-    `may_touch` [V, V] symmetric, `margin_m` between a vehicle's rim and walls or obstacles."""
+    `may_touch` [V, V] symmetric, `margin_m` between a vehicle's rim and walls or obstacles;
+    `may_brush` [V]: those that stand at a wall to begin with."""
 
     speed_mps: float
     impulse_ns: float
     may_touch: Flags
     margin_m: float
+    may_brush: Flags
 
     @classmethod
-    def of_view(cls, view: StationView, suspect: int) -> Self:
-        """The scenario's, and where vehicles are real those of `view.safety`, too."""
+    def of_view(cls, view: StationView, suspect: int, start: Array, model: FleetModel) -> Self:
+        """The scenario's, and where vehicles are real those of `view.safety`, too; for twins that
+        begin in `start` [H, V, S]."""
         given, safety, count = view.limits.manoeuvre, view.safety, len(view.fleet)
         allowed = safety is None or safety.allow_contact
         may_touch = np.full((count, count), given.contacts == "any" and allowed)
@@ -40,6 +44,7 @@ class Limits:
             given.contact_impulse_ns or np.inf,
             may_touch,
             max(given.wall_margin_m, safety.fence_margin_m if safety else 0.0),
+            np.asarray((clearance_m(start, model) < AT_A_WALL_M).any(axis=0)),
         )
 
     @property
@@ -67,7 +72,8 @@ class Limits:
                 bad |= touched & (contacts.speeds_mps > self.speed_mps)
             count += bad.sum(axis=(1, 2)) / 2
         if self.margin_m > 0.0:
-            count += (clearance_m(states, model) < self.margin_m).sum(axis=1)
+            near = clearance_m(states, model) < self.margin_m
+            count += (near & ~self.may_brush).sum(axis=1)
         return count
 
 
