@@ -38,9 +38,9 @@ INVALID = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """`reports` [N, H, K + 1, V, 2] (m) from the start on; `walls` [N]: did any twin touch one that it may not?
-    `breaches` [N]: was any limit broken? `contacts` of N x H rows, if asked for; `work_j` [N, H]
-    against rolling resistance."""
+    """`reports` [N, H, K + 1, V, 2] (m) from the start on; `walls` [N]: did any twin touch one that
+    it may not? `breaches` [N]: was any limit broken? `contacts` of N x H rows, if asked for;
+    `work_j` [N, H] against rolling resistance."""
 
     reports: Array
     walls: Flags
