@@ -14,10 +14,14 @@ from base_station.execution import Orders
 from base_station.phases import AnyPhase, Connecting, Finished, Holding, Settling
 from base_station.planning.requests import Kind, PlanReady, PlanRequest
 from base_station.receiving.fleet import Fleet
+from base_station.receiving.telemetry import Frame
 from base_station.records import Event, EventKind
 from hil.scenario import StationView
 
 Array = NDArray[np.float64]
+
+STILL_M = 0.04  # between the means of two half seconds of reports
+LONG_REST_S = 4.0
 
 
 class Desk:
@@ -77,12 +81,26 @@ class Desk:
         A suspect that is judged by its fixes is where the newest one is: those before it may be
         from when it still rolled.
         """
-        count = round(1.0 / self.fleet.period_s)
-        frames = [moment.frame for moment in list(self.watch.memory)[-count:]]
+        frames = self._last_second()
         mean_m = np.asarray(np.nanmean([f.position_m for f in frames], axis=0))
         if suspect is not None and has_fix(frames[-1], suspect):
             mean_m[suspect] = seen_m(frames[-1], suspect)[suspect]
         return mean_m
+
+    def at_rest(self, since_s: float) -> bool:
+        """Whether all, in HOLD since then, have rolled out: the mean of their reports says where
+        they are. Reports that wander at rest are not waited for for ever."""
+        frames = self._last_second()
+        waited_s = frames[-1].time_s - since_s
+        if waited_s < execution.REST_S:
+            return False
+        older, newer = np.array_split([f.position_m for f in frames], 2)
+        moved_m = np.abs(np.nanmean(newer, axis=0) - np.nanmean(older, axis=0))
+        return bool((moved_m < STILL_M).all()) or waited_s >= LONG_REST_S
+
+    def _last_second(self) -> list[Frame]:
+        count = round(1.0 / self.fleet.period_s)
+        return [moment.frame for moment in list(self.watch.memory)[-count:]]
 
     def ask(
         self,

@@ -12,7 +12,7 @@ from hil.scenario import StationView
 
 Array = NDArray[np.float64]
 
-REST_S = 1.5  # a rover at the speed limit coasts to rest in 1 s
+REST_S = 1.5  # at least: a rover at the speed limit coasts to rest in 1 s or a little more
 SETTLE_S = 0.8  # a pulse coasts out within 0.4 s; the rest averages noise
 SPACING_M = 0.35  # gap below which a rover on its way back bends around another
 

@@ -52,10 +52,9 @@ class Gap:
         since_s = frame.time_s if self.standing_since_s is None else self.standing_since_s
         return replace(self, standing_since_s=since_s)
 
-    def is_over(self, frame: Frame) -> bool:
-        """Heard, and at rest: in HOLD for long enough."""
-        since_s = self.standing_since_s
-        return since_s is not None and frame.time_s - since_s >= execution.REST_S
+    def is_over(self, desk: Desk) -> bool:
+        """Heard, and at rest."""
+        return self.standing_since_s is not None and desk.at_rest(self.standing_since_s)
 
 
 def out_of_touch_since_s(desk: Desk, frame: Frame) -> float | None:

@@ -190,7 +190,7 @@ class Station:
     def _mind_the_gap(self, gap: Gap, frame: Frame) -> None:
         """Everybody holds until all are heard again and at rest."""
         self.desk.orders = self.desk.hold()
-        over = (gap.is_over(frame) and not self._commander.released) or self.desk.ended
+        over = (gap.is_over(self.desk) and not self._commander.released) or self.desk.ended
         self._gap = None if over else gap
         if over and not self.desk.ended:
             bridge(self.desk, gap, frame)

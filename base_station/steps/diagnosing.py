@@ -27,7 +27,7 @@ def settle(desk: Desk, phase: Settling, frame: Frame) -> Orders:
     if not frame.all_stand:
         desk.phase = replace(phase, since_s=frame.time_s)
         return desk.hold()
-    if frame.time_s - phase.since_s < execution.REST_S or not caught_up:
+    if not (caught_up and desk.at_rest(phase.since_s)):
         return desk.hold()
     opened = phase.hindsight.doubt()
     if hearing.trouble(frame, desk.fleet.period_s).any():
@@ -133,7 +133,7 @@ def conclude(desk: Desk, phase: Concluding, frame: Frame) -> Orders:
     """[2] At rest: the verdict, or another plan from where each twin stands now."""
     if not frame.all_stand:
         desk.phase = replace(phase, since_s=frame.time_s)
-    elif frame.time_s - phase.since_s >= execution.REST_S:
+    elif desk.at_rest(phase.since_s):
         named = desk.open_doubt.verdict(desk.view.diagnosis.decide_at).decided
         desk.doubt = doubts.anchor(desk.open_doubt, desk.mean_report_m(desk.open_doubt.suspect))
         _escalate(desk, named)
