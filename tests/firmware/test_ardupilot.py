@@ -1,8 +1,11 @@
 """The real ArduPilot rover in our world, where ARDUROVER names its simulator."""
 
+import select
 import subprocess
 import sys
+import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -10,8 +13,10 @@ from worlds import SPEED, firmware_world
 
 from base_station.identify.process import identify
 from hil.bench.firmware.ardupilot import BINARY, binary
+from hil.bench.injector import Breaker
 from hil.lifeline import dying_with_parent
-from hil.scenario import Scenario
+from hil.link import UdpLink
+from hil.scenario import FaultModel, Scenario
 
 HIL = (sys.executable, "-m", "hil.cli")
 ABLE = {  # what a scenario of such a fleet wants, as in docs/real-vehicles.md
@@ -103,6 +108,36 @@ def run(scenario: Path, out: Path) -> tuple[int, str, list[int]]:
                 below = descendants(process.pid)
                 firmware = [pid for pid, argv in below.items() if "ardurover" in argv]
     return process.returncode, "".join(said), firmware
+
+
+FIRMWARE_MAKES: tuple[dict[str, Any], ...] = (
+    {"unit": "gps", "type": "off"},
+    {"unit": "gps", "type": "offset", "size": (2.0, -1.0, 0.5)},
+    {"unit": "gps", "type": "delay", "size": (0.4,)},
+    {"unit": "accel", "type": "bias", "size": (0.1, 0.2, 0.3)},
+    {"unit": "gyro", "type": "bias", "size": (0.01, 0.02, 0.03), "instances": (1,)},
+)
+
+
+def test_it_echoes_every_parameter_of_a_fault_that_it_makes_itself(tmp_path: Path) -> None:
+    """A name that it does not know would not be answered."""
+    faults = [FaultModel(vehicle=1, **fault) for fault in FIRMWARE_MAKES]
+    struck: list[FaultModel] = []
+    mended: list[FaultModel] = []
+    with firmware_world(lone_rover(), tmp_path) as scenario:
+        assert scenario.links.injector_port_base is not None
+        link = UdpLink.bind(scenario.links.host, scenario.links.injector_port_base)
+        breaker = Breaker(scenario, struck.append, mended.append, lambda _: None)
+        try:
+            for ask in (breaker.strike, breaker.mend):
+                ask(faults)
+                while not breaker.done:
+                    for datagram in breaker.step(time.monotonic(), 1, link.receive()):
+                        link.send(datagram)
+                    select.select([link.fileno()], [], [], 0.05)
+        finally:
+            link.close()
+    assert struck == mended == faults
 
 
 @pytest.mark.timeout(600)

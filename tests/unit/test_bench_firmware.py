@@ -51,7 +51,7 @@ def test_other_faults_that_it_has_a_parameter_for() -> None:
     assert mending(known, fault).parameters == (("SIM_GPS_LAG_MS", 100.0),)
     known, fault = scenario("ardupilot", unit="accel", type="bias", size=[0.1, 0.0, 0.3])
     names = [name for name, _ in breaking(known, fault).parameters]
-    assert names == [f"SIM_ACC{i}_BIAS_{axis}" for i in (1, 2) for axis in "XYZ"]
+    assert names == [f"SIM_ACC{i}_BIAS_{axis}" for i in (1, 2) for axis in "ZYX"]
 
 
 def test_our_own_vehicle_is_broken_as_ever() -> None:
@@ -90,5 +90,5 @@ def test_each_parameter_is_sent_until_it_is_echoed() -> None:
         names.append(order.name)
         echo = ParamValue(order.name, order.value, 0, 1)
         answers = [] if k == 0 else [Encoder(1, COMPONENT_AUTOPILOT).encode(echo)]
-    assert names == [f"SIM_GPS_GLITCH_{axis}" for axis in "XXYZ"]
+    assert names == [f"SIM_GPS_GLITCH_{axis}" for axis in "ZZYX"]
     assert struck == [fault]

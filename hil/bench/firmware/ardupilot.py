@@ -132,7 +132,8 @@ def mended(fault: Fault, lat_deg: float) -> tuple[tuple[str, float], ...] | None
 
 
 def _vector(prefix: str, values: Sequence[float]) -> tuple[tuple[str, float], ...]:
-    return tuple((f"{prefix}_{axis}", v) for axis, v in zip("XYZ", values, strict=True))
+    """X last: it is echoed together with the others, as they are then."""
+    return tuple((f"{prefix}_{axis}", v) for axis, v in zip("ZYX", values[::-1], strict=True))
 
 
 def _throttle_for(frame: Airframe, speed_mps: float) -> float:
