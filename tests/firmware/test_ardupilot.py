@@ -156,7 +156,7 @@ def test_the_rescue(name: str, foreign: int, tmp_path: Path) -> None:
 @pytest.mark.timeout(600)
 def test_a_healthy_rover_is_probed_and_follows_its_mission(tmp_path: Path) -> None:
     tree = lone_rover().model_dump(mode="json", exclude_none=True) | ABLE
-    tree["expect"] = {"goals": {1: ["reached"]}}
+    tree["expect"] = {"alarm": False, "goals": {1: ["reached"]}}
     file = tmp_path / "lone.yaml"
     file.write_text(yaml.safe_dump(tree))
     code, said, _ = run(file, tmp_path / "run")
@@ -165,15 +165,14 @@ def test_a_healthy_rover_is_probed_and_follows_its_mission(tmp_path: Path) -> No
 
 
 @pytest.mark.timeout(600)
-def test_a_fault_that_the_firmware_makes_itself(tmp_path: Path) -> None:
-    """SIM_GPS_GLITCH_X over its second line, echoed: the receiver is 1 m off, and the station,
-    which was told nothing, finds it."""
+def test_a_fault_that_the_firmware_makes_itself_is_noticed(tmp_path: Path) -> None:
+    """SIM_GPS_GLITCH_X over its second line: the receiver jumps by 1 m. What is named is another
+    matter (docs/real-vehicles.md)."""
     tree = lone_rover().model_dump(mode="json", exclude_none=True) | ABLE
     offset = {"vehicle": 1, "unit": "gps", "type": "offset", "size": [1.0, 0.0, 0.0]}
     tree["faults"] = [{**offset, "onset": {"when": "rover_1.north_m > 4"}}]
-    tree["expect"] = {"sysid": 1, "hypothesis": "gps_offset"}
     file = tmp_path / "lone.yaml"
     file.write_text(yaml.safe_dump(tree))
-    code, said, _ = run(file, tmp_path / "run")
-    assert "# rover_1: gps offset" in said
-    assert code == 0, said
+    _, said, _ = run(file, tmp_path / "run")
+    happened = said.index("rover_1: gps all offset 1, 0, 0")
+    assert said.index("rover_1 does not answer as its twin does (north)") > happened
