@@ -38,7 +38,7 @@ class Desk:
         self.doubt: Doubt | None = None
         self.verdict: Verdict | None = None
         self.tries = 0  # experiments on the present suspect ...
-        self.solos = 0  # ... and how often it has been driven alone
+        self.soloed = False  # ... and whether it has been driven alone
         self.goals = mission.Goals.of(view)
         self.mission_plans = 0
         self.mission_s = 0.0  # on the way, planning not counted

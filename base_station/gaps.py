@@ -88,7 +88,7 @@ def _resumed(desk: Desk, gap: Gap, now_s: float) -> AnyPhase:
         case Probing():
             return Probing(now_s)
         case Experimenting(plan=plan):  # the one that was cut short does not count
-            desk.solos -= plan.solo
+            desk.soloed = desk.soloed and not plan.solo
             desk.tries -= not plan.solo
             return Concluding(now_s)
         case phase:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from base_station import twin
 from base_station.autopilots import adapter
-from base_station.belief.escalation import LEAVE, PUSH, RECKON, remedy
+from base_station.belief.escalation import PUSH, RECKON, remedy
 from base_station.belief.hypotheses import Hypothesis, nominal
 from base_station.belief.watch import Watch
 from base_station.execution import Orders
@@ -102,20 +102,16 @@ def can_drive(watch: Watch, view: StationView) -> Flags:
     """[V] vehicles that can go anywhere by themselves."""
     able = np.ones(len(view.fleet), dtype=np.bool_)
     for hypothesis in watch.baseline.known:
-        if remedy(hypothesis).startswith((PUSH, LEAVE)):
+        if remedy(hypothesis).startswith(PUSH):
             able[watch.baseline.model.index(hypothesis.sysid)] = view.yaw == "free"
     return able
 
 
-def why_left(hypothesis: Hypothesis, view: StationView) -> str | None:
-    """Why the vehicle can neither drive nor be pushed to its goal, if that is so."""
+def must_be_left(hypothesis: Hypothesis, view: StationView) -> bool:
+    """Whether the vehicle can neither be driven (its autopilot needs a fix) nor needs a push."""
     member = next(m for m in view.fleet if m.sysid == hypothesis.sysid)
-    what = remedy(hypothesis)
-    if what.startswith(RECKON) and not adapter(member.autopilot, member.frame).drives_without_fix:
-        return "its autopilot needs its GPS to drive"
-    if what.startswith(LEAVE) and view.yaw == "locked":
-        return "nobody pushes blocked wheels"
-    return None
+    reckons = remedy(hypothesis).startswith(RECKON)
+    return reckons and not adapter(member.autopilot, member.frame).drives_without_fix
 
 
 def orders(

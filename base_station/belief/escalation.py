@@ -23,7 +23,7 @@ PLAUSIBLE = 0.005  # explanations less likely than this are not worth an experim
 APART_M = 0.15  # reports that differ by this are told apart: five sigma
 PULSE_S, REST_S = 1.0, 1.0  # at full speed: what a weak motor does at walking pace is friction's
 TURNING_PULSE_S = 1.5  # of who turns before it gets anywhere
-PUSH, LEAVE, RECKON = "push", "leave", "reckon"
+PUSH, RECKON = "push", "reckon"
 WEAK = 0.5  # a motor with less than this of its force is no use
 
 
@@ -33,8 +33,6 @@ def remedy(hypothesis: Hypothesis) -> str:
     if fault is None:
         return hypothesis.name
     if fault.unit is Unit.MOTOR:
-        if fault.type is Type.LOCKED:
-            return f"{LEAVE} {fault.instances}"
         weak = fault.type is not Type.PARTIAL or fault.size[0] < WEAK
         return f"{PUSH} {fault.instances}" if weak else "drive"
     if fault.type is Type.STUCK:
@@ -91,30 +89,6 @@ def solo(doubt: Doubt, view: StationView) -> OpenLoopPlan | None:
     period_s = 1.0 / view.clock.control_hz
     predicted = np.moveaxis(reports_m, 0, 1)
     return OpenLoopPlan(plan, period_s, held, float("nan"), predicted) if apart else None
-
-
-def inseparable(doubt: Doubt, view: StationView) -> tuple[tuple[str, str], ...]:
-    """Pairs of plausible explanations that no manoeuvre allowed here can tell apart.
-
-    They expect the same reports of the suspect alone, and either a push answers both alike, or
-    nobody may touch the suspect. To be asked at rest, before anything is driven.
-    """
-    likely = plausible(doubt)
-    reports_m = _predicted(doubt, view, _solo_setpoints(doubt, view), likely)
-    pushed = _may_be_pushed(doubt.suspect, view)
-    pairs = []
-    for (i, a), (j, b) in itertools.combinations(enumerate(likely), 2):
-        alike = _way_to_move(doubt.estimated(a)) == _way_to_move(doubt.estimated(b))
-        one, other = doubt.twins[a], doubt.twins[b]
-        if (alike or not pushed) and not _tells(one, other, reports_m[:, i], reports_m[:, j]):
-            pairs.append((one.name, other.name))
-    return tuple(pairs)
-
-
-def _may_be_pushed(suspect: int, view: StationView) -> bool:
-    limits = view.limits.manoeuvre
-    touchable = view.fleet[suspect].sysid not in limits.untouchable
-    return len(view.fleet) > 1 and limits.contacts != "none" and touchable
 
 
 def _tells(one: Hypothesis, other: Hypothesis, one_m: Array, other_m: Array) -> bool:

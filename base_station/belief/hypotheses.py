@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hil.airframe import Airframe
 from hil.faults import NED_AXES, Fault, Type, Unit
 from hil.scenario import FleetMember, Priors
 
@@ -39,8 +38,8 @@ class Hypothesis:
         return replace(self, fault=replace(self.fault, size=tuple(size)))
 
 
-# share of its family's prior that a type has; those of one type share it
-MOTOR_SHARES = {Type.OFF: 0.6, Type.LOCKED: 0.1, Type.PARTIAL: 0.2, Type.REVERSED: 0.1}
+# share of its family's prior that a type has; the axes of a type share it
+MOTOR_SHARES = {Type.OFF: 0.7, Type.PARTIAL: 0.2, Type.REVERSED: 0.1}
 GPS_SHARES = {
     Type.STUCK: 0.6,
     Type.OFFSET: 0.15,
@@ -65,13 +64,12 @@ def nominal(sysid: int) -> Hypothesis:
 def candidates(member: FleetMember, priors: Priors) -> tuple[Hypothesis, ...]:
     """Every explanation this station knows for a vehicle that does not answer as it should.
 
-    The motors of a body axis, or all of them, off, locked, weak or reversed; GPS stuck (a
-    horizontal NED axis or all), off by a constant, drifting, noisy or late; nothing wrong after
-    all; and something else. A single motor off is a weak axis, as far as positions tell. Priors of
-    a family are shared out over types, and over what may have that type of fault, and sum to 1.
+    The motors of a body axis off, weak or reversed; GPS stuck (a horizontal NED axis or all), off
+    by a constant, drifting, noisy or late; nothing wrong after all; and something else. Priors of a
+    family are shared out over types and axes, and sum to 1.
     """
     weighted: list[tuple[str, Fault | None, float]] = [
-        *_weighted(motor_faults(member.frame), priors.motor, MOTOR_SHARES),
+        *_weighted(_motor_faults(member), priors.motor, MOTOR_SHARES),
         *_weighted(_gps_faults(), priors.gps, GPS_SHARES),
         (NONE, None, priors.none),
         (UNKNOWN, None, priors.unknown),
@@ -80,15 +78,11 @@ def candidates(member: FleetMember, priors: Priors) -> tuple[Hypothesis, ...]:
     return tuple(Hypothesis(n, member.sysid, w / total, f) for n, f, w in weighted)
 
 
-def motor_faults(frame: Airframe) -> Iterator[tuple[str, Fault]]:
-    """By name, what may happen to the motors of a body axis, and to those of both."""
-    axes = {axis: motors for axis in ("x", "y") if (motors := frame.axis_motors(axis))}
-    for axis, motors in axes.items():
-        for kind in MOTOR_SHARES:
+def _motor_faults(member: FleetMember) -> Iterator[tuple[str, Fault]]:
+    for axis in ("x", "y"):
+        motors = member.frame.axis_motors(axis)
+        for kind in MOTOR_SHARES if motors else ():
             yield f"motor_{axis}_{kind}", Fault(Unit.MOTOR, kind, motors)
-    for kind in MOTOR_SHARES if len(axes) == 2 else ():
-        if kind is not Type.REVERSED:  # nobody wires two axes wrongly
-            yield f"motor_{kind}", Fault(Unit.MOTOR, kind, tuple(sorted(sum(axes.values(), ()))))
 
 
 def _gps_faults() -> Iterator[tuple[str, Fault]]:

@@ -61,7 +61,6 @@ class Baseline:
             rows.power * known.power.min(axis=0),
             rows.gain * known.gain.prod(axis=0),
             np.maximum(rows.gps_stuck, known.gps_stuck.max(axis=0)),
-            np.maximum(rows.blocked, known.blocked.max(axis=0)),
         )
 
     @property

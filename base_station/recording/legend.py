@@ -9,7 +9,7 @@ from base_station.recording.palette import LIGHT_GREY, TRUTH, WHITE, hypothesis_
 from base_station.recording.scene import DISC_M, GROUND_Z_M, at, circle, usual
 from hil.scenario import StationView
 
-ROWS = 9  # more do not fit beside the arena
+ROWS = 8  # more do not fit beside the arena
 MARGIN = 0.17  # of the arena's width, between it and the middle of an entry
 SIZE = 0.13  # radius of a sign, of the distance between two
 WELL = "if all is well"

@@ -3,7 +3,7 @@
 The hues are Okabe and Ito's, which people with any kind of colour blindness can tell apart.
 Vehicles and hypotheses share none. Broken motors are warm, broken GPS is cool, nothing is grey.
 Explanations that are likely beforehand have a hue to themselves, others a paler one, the rarest a
-darker one. What is wrong with all motors, or with locked wheels, is red.
+darker one.
 """
 
 from collections.abc import Sequence
@@ -30,8 +30,6 @@ LAVENDER: Rgb = (206, 196, 255)
 DIM: Rgb = (110, 116, 126)
 LIGHT_GREY: Rgb = (200, 200, 200)
 GREY: Rgb = (122, 122, 122)
-RED: Rgb = (255, 0, 0)
-CRIMSON: Rgb = (220, 0, 40)
 DARK_GREY: Rgb = (84, 84, 84)
 
 TRUTH = WHITE
@@ -48,11 +46,6 @@ _HYPOTHESES: dict[str, Rgb] = {
     "motor_x_partial": mix(ORANGE, WHITE, 0.6),
     "motor_y_reversed": mix(VERMILION, BLACK, 0.4),
     "motor_x_reversed": mix(ORANGE, BLACK, 0.45),
-    "motor_off": CRIMSON,
-    "motor_partial": mix(RED, GREY, 0.45),
-    "motor_y_locked": (255, 47, 122),
-    "motor_x_locked": (154, 0, 0),
-    "motor_locked": (114, 0, 41),
     "gps_east_stuck": PURPLE,
     "gps_north_stuck": BLUE,
     "gps_stuck": LAVENDER,

@@ -18,7 +18,6 @@ from base_station.receiving.telemetry import Frame
 from base_station.steps.travelling import request_beta
 
 EXPERIMENT_MIN_S = 1.0
-SOLOS = 2  # one ends when it has decided, and at rest that may turn out to have been luck
 MOMENTS_PER_TICK = 4  # of the memory, each about 2 ms: a step must not take 10 ms
 
 
@@ -36,12 +35,8 @@ def settle(desk: Desk, phase: Settling, frame: Frame) -> Orders:
     member = desk.view.fleet[opened.suspect]
     desk.doubt = doubts.anchor(opened, desk.mean_report_m(opened.suspect))
     posterior = opened.verdict(desk.view.diagnosis.decide_at).posterior
-    alike = escalation.inseparable(desk.doubt, desk.view)
-    text = f"{member.name}: {_shown(posterior)}"
-    for one, other in alike:
-        text += f"; no manoeuvre allowed tells {one} from {other}"
-    desk.say("hypotheses", text, posterior=posterior, inseparable=alike)
-    desk.tries, desk.solos = 0, 0
+    desk.say("hypotheses", f"{member.name}: {_shown(posterior)}", posterior=posterior)
+    desk.tries, desk.soloed = 0, False
     _escalate(desk, named=opened.verdict(desk.view.diagnosis.decide_at).decided)
     return desk.hold()
 
@@ -53,12 +48,12 @@ def _escalate(desk: Desk, named: bool) -> None:
     """
     doubt, diagnosis = desk.open_doubt, desk.view.diagnosis
     best = doubt.verdict(diagnosis.decide_at)
-    if best.hypothesis == UNKNOWN and best.decided and (desk.solos or desk.tries):
+    if best.hypothesis == UNKNOWN and best.decided and (desk.soloed or desk.tries):
         _give_up(desk, "no explanation that is known fits")
     elif named and best.hypothesis != UNKNOWN:
         _believe(desk, best)
-    elif desk.solos < SOLOS and (plan := escalation.solo(doubt, desk.view)) is not None:
-        desk.solos += 1
+    elif not desk.soloed and (plan := escalation.solo(doubt, desk.view)) is not None:
+        desk.soloed = True
         twins = tuple(doubt.twins[t].name for t in escalation.plausible(doubt))
         _begin(desk, plan, twins, "plan alpha: the suspect alone, there and back on each axis")
     elif best.hypothesis != UNKNOWN and escalation.remedy_posterior(doubt) >= diagnosis.decide_at:
@@ -124,15 +119,11 @@ def _foretold(plan: OpenLoopPlan) -> dict[str, object]:
 
 
 def experiment(desk: Desk, phase: Experimenting, frame: Frame) -> Orders:
-    """[2] Drive plan alpha to its end, or until it has decided.
-
-    One of a kind that did not hold what it had decided is driven to its end the next time.
-    """
+    """[2] Drive plan alpha to its end, or until it has decided."""
     elapsed_s = frame.time_s - phase.since_s
     orders = execution.plan_orders(phase.plan, elapsed_s)
     decided = desk.open_doubt.verdict(desk.view.diagnosis.decide_at).decided
-    first = (desk.solos if phase.plan.solo else desk.tries) <= 1
-    if orders is None or (decided and first and elapsed_s >= EXPERIMENT_MIN_S):
+    if orders is None or (decided and elapsed_s >= EXPERIMENT_MIN_S):
         desk.enter(Concluding(frame.time_s))
         return desk.hold()
     return orders
@@ -178,9 +169,9 @@ def _believe(desk: Desk, verdict: Verdict) -> None:
         desk.watch.restart(baseline.corrected(told))
     desk.doubt = None
     desk.alarmed.clear()
-    if why := mission.why_left(doubt.estimated(index), desk.view):
+    if mission.must_be_left(doubt.estimated(index), desk.view):
         desk.goals = desk.goals.leaving(doubt.suspect)
-        desk.say("text", f"{name} is left where it is: {why}")
+        desk.say("text", f"{name} is left where it is: its autopilot needs its GPS to drive")
     request_beta(desk)
 
 

@@ -28,10 +28,8 @@ from base_station.twin.state import (
 from base_station.twin.tile import (
     COS,
     DAMP,
-    FORE_LOSS,
     GIVE,
     HELD_E,
-    HELD_FORE,
     HELD_N,
     HELD_SIDE,
     HELD_YAW,
@@ -91,7 +89,7 @@ def take_commands(vehicles: Any, tile: Any, lane: int, setpoints: Any, driven: A
 
 
 @inlined
-def drive(vehicles: Any, tile: Any, v: int, locked: bool, blocked: bool) -> None:
+def drive(vehicles: Any, tile: Any, v: int, locked: bool) -> None:
     if vehicles.heading_first[v]:
         ux, uy, uyaw = heading_first_commands(vehicles, tile, v)
     elif vehicles.skid[v]:
@@ -105,7 +103,7 @@ def drive(vehicles: Any, tile: Any, v: int, locked: bool, blocked: bool) -> None
             output = output + vehicles.mix[v, m, 2] * uyaw
         largest = most(largest, magnitude(output))
     share = 1.0 / largest
-    accelerate(vehicles, tile, v, share * ux, share * uy, share * uyaw, locked, blocked)
+    accelerate(vehicles, tile, v, share * ux, share * uy, share * uyaw, locked)
 
 
 @inlined
@@ -203,9 +201,7 @@ def heading_first_commands(vehicles: Any, tile: Any, v: int) -> Any:
 
 
 @inlined
-def accelerate(
-    vehicles: Any, tile: Any, v: int, ux: Any, uy: Any, uyaw: Any, locked: bool, blocked: bool
-) -> None:
+def accelerate(vehicles: Any, tile: Any, v: int, ux: Any, uy: Any, uyaw: Any, locked: bool) -> None:
     """Motors, then what the ground takes: it stops a motion, and never reverses it."""
     c, s = take(tile, v, COS), take(tile, v, SIN)
     north, east = take(tile, v, V_NORTH), take(tile, v, V_EAST)
@@ -226,11 +222,7 @@ def accelerate(
         put(tile, v, YAW_RATE, rate + scrub)
     x, y = step * x, step * y
     north, east = north + c * x - s * y, east + s * x + c * y
-    if blocked:
-        fore = -clipped(c * north + s * east, take(tile, v, FORE_LOSS))
-        put(tile, v, HELD_FORE, fore)
-        north, east = north + c * fore, east + s * fore
-    if blocked or vehicles.grips[v]:
+    if vehicles.grips[v]:
         side = -clipped(c * east - s * north, take(tile, v, SIDE_LOSS))
         put(tile, v, HELD_SIDE, side)
         north, east = north - s * side, east + c * side

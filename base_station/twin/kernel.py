@@ -63,9 +63,6 @@ def advance_all(
     found = all_pairs(count, pairs) if count <= CELLS_ABOVE else 0
     bodies = np.empty((contacts.shape[0], 2), np.uintp)
     walled = np.empty(count, np.bool_)
-    blocked = np.zeros(count, np.bool_)
-    for v in range(count):
-        blocked[v] = faults.blocked[:, v].any()
     same = draws == 1 and lanes % hypotheses == 0  # every tile has the same constants
     for first in range(0, batch, lanes):
         load(states, first, tile, places)
@@ -85,13 +82,13 @@ def advance_all(
             if step == steps:
                 break
             for v in range(count):
-                drive(vehicles, columns, v, locked, blocked[v])
+                drive(vehicles, columns, v, locked)
             if count > CELLS_ABOVE:
                 found = near_pairs(places, vehicles.radius_m, vehicles.reach_m, pairs)
             between = find_pairs(vehicles, columns, spots, pairs, found, rows, bodies)
             n = find_obstacles(vehicles, columns, spots, between, rows, bodies)
             if find_walls(vehicles, columns, spots, walled) or n > 0:
-                solve_contacts(vehicles, columns, rows, bodies, between, n, walled, locked, blocked)
+                solve_contacts(vehicles, columns, rows, bodies, between, n, walled, locked)
                 note_walls(columns, walled)
                 note_obstacles(columns, rows, bodies, between, n)
                 if impulses.shape[1] > 0:

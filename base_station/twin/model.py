@@ -35,7 +35,6 @@ class Vehicles(NamedTuple):
     grips: Flags  # [V] wheels that can't roll sideways: without them, no side force is looked at
     turn_line: Array  # [V] feed-forward of a skid-steered turn: output per rad/s ...
     turn_scrub: Array  # [V] ... and the output that overcomes scrub
-    grip_n: Array  # [V, M] that a wheel withstands when it is blocked
     heading_first: Flags  # [V] its autopilot has the `helm`, [V, 12] in the order of HeadingFirst
     helm: Array
     bounds_m: Array  # [4] north min, north max, east min, east max
@@ -65,7 +64,6 @@ class FaultArrays(NamedTuple):
     power: Array  # [H, V, M] 1: the motor pulls; 0: its wheel runs free
     gain: Array  # [H, V, M] of its output; a weak motor still brakes like a sound one
     gps_stuck: Array  # [H, V, 2] 1: the NED axis (north, east) is frozen
-    blocked: Array  # [H, V, M] 1: the wheel does not turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +97,6 @@ class FleetModel:
             grips=np.array([f.side_grip_n > 0.0 for f in frames]),
             turn_line=np.array([_turn(f)[0] for f in frames]),
             turn_scrub=np.array([_turn(f)[1] for f in frames]),
-            grip_n=np.array([_padded([m.grip_n for m in f.motors], motors) for f in frames]),
             heading_first=np.array([h is not None for h in helms]),
             helm=np.array([h or (0.0,) * len(HeadingFirst._fields) for h in helms]),
             bounds_m=_bounds_m(view.arena),
@@ -174,7 +171,7 @@ def fault_rows(model: FleetModel, hypotheses: Sequence[Hypothesis]) -> FaultArra
     """Each hypothesis as flags. Raises ValueError for one that has no twin."""
     shape = (len(hypotheses), *model.nominal.stall_force_n.shape[1:])
     power, gain = np.ones(shape), np.ones(shape)
-    stuck, blocked = np.zeros((*shape[:2], 2)), np.zeros(shape)
+    stuck = np.zeros((*shape[:2], 2))
     for h, hypothesis in enumerate(hypotheses):
         if not hypothesis.has_twin:
             raise ValueError(f"hypothesis {hypothesis.name!r} has no twin; leave it out")
@@ -184,8 +181,6 @@ def fault_rows(model: FleetModel, hypotheses: Sequence[Hypothesis]) -> FaultArra
         motors = [i - 1 for i in fault.instances] or slice(None)
         if (fault.unit, fault.type) == (Unit.MOTOR, Type.OFF):
             power[h, v, motors] = 0.0
-        elif (fault.unit, fault.type) == (Unit.MOTOR, Type.LOCKED):
-            power[h, v, motors], blocked[h, v, motors] = 0.0, 1.0
         elif (fault.unit, fault.type) == (Unit.MOTOR, Type.PARTIAL):
             gain[h, v, motors] = fault.size[0]
         elif (fault.unit, fault.type) == (Unit.MOTOR, Type.REVERSED):
@@ -195,7 +190,7 @@ def fault_rows(model: FleetModel, hypotheses: Sequence[Hypothesis]) -> FaultArra
                 stuck[h, v, k] = float(not fault.axes or axis in fault.axes)
         elif fault.unit is not Unit.GPS:  # other GPS faults change reports, not how it drives
             raise ValueError(f"hypothesis {hypothesis.name!r}: no twin for {fault}")
-    return FaultArrays(power, gain, stuck, blocked)
+    return FaultArrays(power, gain, stuck)
 
 
 def _bounds_m(area: Rectangle) -> Array:

@@ -22,10 +22,8 @@ from base_station.twin.state import V_EAST, V_NORTH, YAW_RATE
 from base_station.twin.tile import (
     BUSY,
     COS,
-    FORE_LOSS,
     FRICTION,
     HELD_E,
-    HELD_FORE,
     HELD_N,
     HELD_SIDE,
     HELD_YAW,
@@ -53,7 +51,6 @@ def solve_contacts(
     n: int,
     walled: Any,
     locked: bool,
-    blocked: Any,
 ) -> None:
     """Change velocities so that no gap closes further than to touch. The first `between` of `n`
     contacts are those of two vehicles. A lane that has settled (BUSY 0) stays as it is, so that it
@@ -77,7 +74,7 @@ def solve_contacts(
         for v in range(ground):
             if walled[v]:
                 change = most(change, stop(vehicles, tile, v, friction, busy, eager, locked))
-            hold(vehicles, tile, v, busy, locked, blocked[v])
+            hold(vehicles, tile, v, busy, locked)
         going = change > SETTLED_NS
         if not anywhere(going):
             break
@@ -167,7 +164,7 @@ def bounded(
 
 
 @inlined
-def hold(vehicles: Any, tile: Any, v: int, busy: Any, locked: bool, blocked: bool) -> None:
+def hold(vehicles: Any, tile: Any, v: int, busy: Any, locked: bool) -> None:
     """What the ground takes of a velocity, afresh: no more in sum than it can hold."""
     north, east = take(tile, v, V_NORTH), take(tile, v, V_EAST)
     if not locked:
@@ -175,13 +172,7 @@ def hold(vehicles: Any, tile: Any, v: int, busy: Any, locked: bool, blocked: boo
         scrub = busy * (clipped(before - rate, take(tile, v, YAW_LOSS)) - before)
         put(tile, v, YAW_RATE, rate + scrub)
         put(tile, v, HELD_YAW, before + scrub)
-    if blocked:
-        c, s, held = take(tile, v, COS), take(tile, v, SIN), take(tile, v, HELD_FORE)
-        wanted = held - (c * north + s * east)
-        fore = busy * (clipped(wanted, take(tile, v, FORE_LOSS)) - held)
-        put(tile, v, HELD_FORE, held + fore)
-        north, east = north + c * fore, east + s * fore
-    if blocked or vehicles.grips[v]:
+    if vehicles.grips[v]:
         c, s, held = take(tile, v, COS), take(tile, v, SIN), take(tile, v, HELD_SIDE)
         wanted = held - (c * east - s * north)
         side = busy * (clipped(wanted, take(tile, v, SIDE_LOSS)) - held)

@@ -44,9 +44,7 @@ STOPPED = COS + 22  # what walls have taken off the speed in this step, m/s ...
 RUBBED = COS + 24  # ... and, by friction, off that along the other axis
 GIVE = COS + 26  # 9 columns
 DAMP = GIVE + 9  # 9 columns
-FORE_LOSS = DAMP + 9  # as SIDE_LOSS, but along body x: blocked wheels
-HELD_FORE = DAMP + 10
-COLUMNS = DAMP + 11
+COLUMNS = DAMP + 9
 
 # of the ground's block
 FRICTION = PULL  # of this world's contacts
@@ -110,11 +108,6 @@ def gather_motor(
         pull = parameters.stall_force_n[p, v, m] * faults.power[h, v, m]
         tile[v, PULL, lane] = pull * faults.gain[h, v, m]
         tile[v, SLOWING, lane] = pull / parameters.free_speed_mps[p, v, m]
-        grip = faults.blocked[h, v, m] * vehicles.grip_n[v, m] * vehicles.dt_s
-        per_mass, per_inertia = tile[v, INVERSE_MASS, lane], tile[v, INVERSE_INERTIA, lane]
-        tile[v, FORE_LOSS, lane] += abs(jacobian(vehicles, v, m, 0)) * grip * per_mass
-        tile[v, SIDE_LOSS, lane] += abs(jacobian(vehicles, v, m, 1)) * grip * per_mass
-        tile[v, YAW_LOSS, lane] += abs(jacobian(vehicles, v, m, 2)) * grip * per_inertia
     for i in range(3):
         row = jacobian(vehicles, v, m, i)
         if row == 0.0:

@@ -2,13 +2,18 @@
 
 from collections.abc import Sequence
 
-from base_station.belief.hypotheses import motor_faults
 from hil.airframe import Airframe
 from hil.faults import Fault, Type, Unit
 
 NONE, UNKNOWN = "none", "unknown"
 CANNOT_TELL, NO_ALARM, WRONG_VEHICLE = "cannot tell", "no alarm", "wrong vehicle"
 
+_MOTOR_KINDS = {
+    Type.OFF: "off",
+    Type.PARTIAL: "partial",
+    Type.REVERSED: "reversed",
+    Type.LOCKED: "locked",
+}
 _GPS_KINDS = {
     Type.OFFSET: "offset",
     Type.DRIFT: "drift",
@@ -28,7 +33,7 @@ def expected_hypothesis(faults: Sequence[Fault], frame: Airframe) -> str:
     if len(kinds) > 1:
         return UNKNOWN
     ((unit, kind),) = kinds
-    if unit is Unit.MOTOR:
+    if unit is Unit.MOTOR and kind in _MOTOR_KINDS:
         return _motor_name(faults, kind, frame)
     if unit is Unit.GPS and kind is Type.STUCK:
         return _stuck_name(faults)
@@ -51,8 +56,8 @@ def _motor_name(faults: Sequence[Fault], kind: Type, frame: Airframe) -> str:
         return UNKNOWN
     every = range(1, len(frame.motors) + 1)
     broken = {i for f in faults for i in f.instances or every}
-    known = {(f.type, *f.instances): name for name, f in motor_faults(frame)}
-    return known.get((kind, *sorted(broken)), UNKNOWN)
+    axes = [a for a in ("x", "y") if broken == set(frame.axis_motors(a))]
+    return f"motor_{axes[0]}_{_MOTOR_KINDS[kind]}" if len(axes) == 1 else UNKNOWN
 
 
 def _stuck_name(faults: Sequence[Fault]) -> str:

@@ -24,8 +24,6 @@ X, Y = FRAME.axis_motors("x"), FRAME.axis_motors("y")
         ([Fault(Unit.MOTOR, Type.PARTIAL, Y, size=(0.0,))], "motor_y_off"),
         ([Fault(Unit.MOTOR, Type.REVERSED, X)], "motor_x_reversed"),
         ([Fault(Unit.MOTOR, Type.LOCKED, X)], "motor_x_locked"),
-        ([Fault(Unit.MOTOR, Type.OFF)], "motor_off"),
-        ([Fault(Unit.MOTOR, Type.PARTIAL, (*X, *Y), size=(0.5,))], "motor_partial"),
         ([Fault(Unit.GPS, Type.STUCK, axes=("north",))], "gps_north_stuck"),
         ([Fault(Unit.GPS, Type.STUCK, axes=("east", "down"))], "gps_east_stuck"),
         ([Fault(Unit.GPS, Type.STUCK)], "gps_stuck"),
@@ -44,7 +42,7 @@ def test_what_the_station_knows_has_its_name(faults: list[Fault], name: str) -> 
     "faults",
     [
         [Fault(Unit.MOTOR, Type.OFF, (1,))],
-        [Fault(Unit.MOTOR, Type.REVERSED)],
+        [Fault(Unit.MOTOR, Type.OFF)],  # all four: no axis
         [Fault(Unit.MOTOR, Type.STUCK, Y)],
         [Fault(Unit.GPS, Type.OFF)],
         [Fault(Unit.GPS, Type.STUCK, axes=("down",))],

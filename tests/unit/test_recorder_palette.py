@@ -51,7 +51,7 @@ def test_every_hypothesis_has_a_colour_of_its_own_and_no_vehicle_shares_it() -> 
 @pytest.mark.parametrize("sight", SIGHTS)
 def test_the_usual_hypotheses_are_told_apart_by_everybody(sight: str) -> None:
     names = usual(fake.view())
-    assert len(names) == 7
+    assert len(names) == 6
     for a, b in itertools.combinations(names, 2):
         difference = apart(hypothesis_color(a), hypothesis_color(b), sight)
         assert difference > TOLD_APART, (a, b)

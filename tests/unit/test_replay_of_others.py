@@ -91,11 +91,11 @@ REST: Velocities = {1: (0.0, 0.0)}
 
 
 def story(script: Script) -> None:
-    """Everybody a bit to east and north, a pause in GUIDED, then rover 3 runs into rover 2."""
+    """Everybody a bit to the east, a pause in GUIDED, then rover 3 runs into rover 2."""
     script.begin()
     for sysid in (1, 2, 3):
-        for velocity_mps in ((0.0, 0.5), (0.0, -0.5), (0.5, 0.0), (-0.5, 0.0)):
-            script.drive(0.6, {sysid: velocity_mps})
+        for east_mps in (0.5, -0.5):
+            script.drive(0.6, {sysid: (0.0, east_mps)})
             script.drive(1.0, REST)
     script.drive(4.0, REST)
     script.drive(4.0, {3: (0.0, -0.8)})

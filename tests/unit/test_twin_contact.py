@@ -24,7 +24,6 @@ from base_station.twin import (
 )
 from base_station.twin.search import near_pairs
 from hil.airframe import OMNI_PLUS
-from hil.faults import Fault, Type, Unit
 from hil.scenario import FleetMember, Uncertainty, load_scenario, station_view
 
 RESCUE = Path(__file__).parents[2] / "scenarios" / "rescue.yaml"
@@ -95,18 +94,6 @@ def test_the_push_is_as_strong_as_what_it_overcomes():
     push = advance(model, model.nominal, healthy(model), steady, commands, [True, False], 1.0)
     assert push.impulses_ns[0, 0, 1] == pytest.approx(OMNI_PLUS.rolling_force_n * 1.0, rel=0.02)
     assert push.impulses_ns[0, 1, 0] == push.impulses_ns[0, 0, 1]
-
-
-@pytest.mark.parametrize("yaw", ["locked", "free"])
-def test_one_rover_cannot_push_another_whose_wheels_are_blocked(yaw):
-    model = fleet(2, yaw=yaw)
-    fault = Fault(Unit.MOTOR, Type.LOCKED, OMNI_PLUS.axis_motors("y"))
-    faults = fault_rows(model, [Hypothesis("motor_y_locked", model.sysids[1], 1.0, fault)])
-    start = initial_state([[[0.0, 0.0], [0.0, 0.6]]], [[0.0, 0.0]])
-    commands = [[0.0, 1.0, NAN], STILL]
-    after = advance(model, model.nominal, faults, start, commands, [True, False], 3.0)
-    assert after.states[0, 1, EAST] == pytest.approx(0.6, abs=1e-3)
-    assert after.impulses_ns[0, 0, 1] > 0.0
 
 
 def test_a_collision_keeps_momentum_and_leaves_no_bounce():

@@ -59,17 +59,6 @@ def run(model, hypothesis, state, setpoint, driven, duration_s):
     return advance(model, model.nominal, faults, state, [setpoint], driven, duration_s).states
 
 
-@pytest.mark.parametrize(("yaw_rad", "along"), [(0.0, V_NORTH), (math.pi / 2, V_EAST)])
-def test_blocked_wheels_brake_along_their_axis_alone(yaw_rad, along):
-    locked = Hypothesis("motor_x_locked", 2, 1.0, Fault(Unit.MOTOR, Type.LOCKED, (1, 2)))
-    rolling_n, grip_n = OMNI_PLUS.rolling_force_n, 2 * OMNI_PLUS.motors[0].grip_n
-    for axis, force_n in ((along, rolling_n + grip_n), (7 - along, rolling_n)):
-        state = at_rest(yaw_rad)
-        state[0, 0, axis] = 0.8
-        after = run(lone(), locked, state, [0, 0, NAN], HOLD, 0.1)[0, 0]
-        assert after[axis] == pytest.approx(0.8 - 0.1 * force_n / OMNI_PLUS.mass_kg, rel=1e-6)
-
-
 @pytest.mark.parametrize("yaw_rad", [0.0, math.pi / 2])
 def test_a_healthy_rover_reaches_its_set_point(yaw_rad):
     state = run(lone(), HEALTHY, at_rest(yaw_rad), [0.3, -0.4, NAN], DRIVE, 15.0)
