@@ -20,8 +20,8 @@ class KeepAlive:
         self._asked_s = (float("-inf"), float("-inf"))
 
     def due(self, wall_s: float, fleet_s: float, loss: float) -> list[Command]:
-        """What is due now; heartbeats the more often the more gets lost, for a vehicle that misses
-        a few of them stops by itself."""
+        """What is due now; heartbeats the more often the more gets lost (`loss`: a share of 1), for
+        a vehicle that misses a few of them stops by itself."""
         commands: list[Command] = []
         now_s = (wall_s, fleet_s)
         if _since(self._beat_s, now_s) >= HEARTBEAT_S / copies(loss):
